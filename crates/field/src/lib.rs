@@ -34,7 +34,7 @@ pub use grid_field::{GridField, Inside};
 pub use isosurface_spacing::isosurface_spacing;
 pub use marching_cubes::isosurface_to_mesh;
 pub use mpu::{MpuField, MpuParams, MpuReport, SurfaceSample};
-pub use search::{ZeroSearch, extinct_bounds, visible_ends};
+pub use search::{ZeroSearch, extinct_bounds, surface_ends, visible_ends};
 pub use solids::{Combination, Solid};
 /// The nouns that this crate takes and returns.
 pub use splat_core;

@@ -99,6 +99,39 @@ pub fn visible_ends(grid: &Grid, transfer: &TransferFunction, scale: f64, clips:
     ends
 }
 
+/// Places where an isosurface crosses the edges of the lattice: of every row of the lattice the outermost ones, so that their box is that of the
+/// whole surface. Empty if the surface crosses none.
+pub fn surface_ends(grid: &Grid, isovalue: f64) -> Vec<DVec3> {
+    let [nx, ny, _] = grid.dims;
+    let value = |[i, j, k]: [usize; 3]| f64::from(grid.values[i + nx * (j + ny * k)]);
+    let row = |row: usize| {
+        let mut ends: Vec<DVec3> = Vec::new();
+        for axis in 0..3 {
+            // Index of the crossing on the edge that leads from a lattice point along the axis.
+            let crossing = |i: usize| {
+                let from = [i, row % ny, row / ny];
+                let mut to = from;
+                to[axis] += 1;
+                if to[axis] == grid.dims[axis] {
+                    return None;
+                }
+                let [first, last] = [from, to].map(value);
+                let crosses = (first > isovalue) != (last > isovalue);
+                let mut index = DVec3::from_array(from.map(|n| n as f64));
+                index[axis] += (isovalue - first) / (last - first);
+                crosses.then_some(index)
+            };
+            for along in [0, axis] {
+                let order = |a: &DVec3, b: &DVec3| a[along].total_cmp(&b[along]);
+                ends.extend((0..nx).filter_map(crossing).min_by(order));
+                ends.extend((0..nx).filter_map(crossing).max_by(order));
+            }
+        }
+        ends.into_iter().map(|index| grid.origin + grid.axes * index)
+    };
+    (0..grid.values.len() / nx.max(1)).into_par_iter().flat_map_iter(row).collect()
+}
+
 /// Cells that fill a box.
 struct Cells {
     low: DVec3,
@@ -143,6 +176,24 @@ mod tests {
         let around = DAabb::new(DVec3::splat(-REACH), DVec3::splat(1.0 + REACH));
         assert_eq!(seen(2), around);
         assert_eq!(seen(80), DAabb::new(DVec3::ZERO, DVec3::splat(79.0)));
+    }
+
+    #[test]
+    fn an_isosurface_has_the_ends_of_a_ball_wherever_that_lies() {
+        let middle = DVec3::new(5.3, 9.1, 6.7);
+        let radius = 3.4;
+        let dims = [14, 17, 12];
+        let place = |i: usize| DVec3::new((i % 14) as f64, (i / 14 % 17) as f64, (i / 14 / 17) as f64);
+        let values: Vec<f32> = (0..14 * 17 * 12).map(|i| (radius - place(i).distance(middle)) as f32).collect();
+        let step = DVec3::new(1.0, 2.0, -0.5);
+        let axes = DMat3::from_diagonal(step);
+        let grid = Grid { origin: DVec3::splat(100.0), axes, dims, values };
+        let ends = DAabb::of_points(surface_ends(&grid, 0.0));
+        let around = DAabb::around(grid.origin + step * middle, (radius * step).abs());
+        // Edges of the lattice meet a ball a little inside of its ends.
+        let inside = (ends.min - around.min).min(around.max - ends.max) / step.abs();
+        assert!(inside.min_element() > -1e-6 && inside.max_element() < 0.15, "{inside}");
+        assert_eq!(surface_ends(&grid, 99.0), []);
     }
 
     #[test]

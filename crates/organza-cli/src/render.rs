@@ -368,7 +368,7 @@ impl Job<'_> {
                 .push("there is no legend: nothing that is drawn has a number that its colour stands for".to_owned());
         }
         let has_background = self.scene.background != [0.0; 3] || self.scene.environment.is_some();
-        let params = output::Params { half, deep, transparent, has_background, legend };
+        let params = output::Params { half, deep, transparent, has_background, legend, ..output::Params::default() };
         let mut written = Vec::with_capacity(self.places.outputs.len());
         for target in &self.places.outputs {
             let path = target.path();

@@ -1,4 +1,4 @@
-//! A legend over the right border of a displayed picture: the bar of a colour map with its numbers, or the
+//! A legend over the right border of a displayed picture, or in a strip beside it: the bar of a colour map with its numbers, or the
 //! colours of whole numbers.
 //!
 //! All lengths follow from the picture's shorter side, so the legend scales with the picture. Panels darken the picture behind
@@ -10,8 +10,10 @@ mod ticks;
 
 pub(super) use canvas::Canvas;
 
+use crate::LegendPlace;
 use crate::png_file::encoded;
 use organza_scene::{ColorScale, MapScale, ScaleNumbers};
+use splat_core::{LayerData, Layers};
 use std::ops::Range;
 use ticks::{Ticks, whole};
 
@@ -31,6 +33,8 @@ const LEAST_BAR: f64 = 6.0;
 /// Greatest height of a panel over that of the picture, and greatest width over its width: the middle stays free.
 const HIGHEST: f64 = 0.62;
 const WIDEST: f64 = 0.3;
+/// Greatest width of a panel beside the picture over the picture's height. Its height may be that of the picture, as it covers nothing.
+const WIDEST_BESIDE: f64 = 0.6;
 /// Text beside the colour of what has no number.
 const NO_NUMBER: &str = "no number";
 /// Most whole numbers of one panel.
@@ -59,28 +63,72 @@ enum Content {
     Rows(Vec<(Option<[f32; 3]>, String)>),
 }
 
-/// Draws legends, the first at the top; gives the number of those that the picture has no room for.
-pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale]) -> u64 {
-    let [width, height] = canvas.size().map(f64::from);
-    let capital = (CAPITAL * width.min(height)).max(LEAST_CAPITAL);
-    let margin = capital;
-    // As many as there is room for, all alike.
-    let panels = (1..=scales.len()).rev().find_map(|count| {
-        let share = ((height - margin) / count as f64 - margin).min(HIGHEST * height);
-        let room = [WIDEST * width, share];
-        scales[..count]
-            .iter()
-            .map(|scale| panel(scale, title(scale, scales), capital, room))
-            .collect::<Option<Vec<_>>>()
-    });
-    let panels = panels.unwrap_or_default();
+/// Panels above each other, as many as there is room for.
+struct Panels<'a> {
+    panels: Vec<Panel<'a>>,
+    /// Height of a capital letter, which is also the distance between panels and to the border, pixels.
+    capital: f64,
+}
+
+impl<'a> Panels<'a> {
+    /// Panels for a picture of this size. Beside the picture they follow from its height alone.
+    fn new(size: [u32; 2], scales: &'a [ColorScale], place: LegendPlace) -> Self {
+        let [width, height] = size.map(f64::from);
+        let (shorter, widest, highest) = match place {
+            LegendPlace::Over => (width.min(height), WIDEST * width, HIGHEST * height),
+            LegendPlace::Beside => (height, WIDEST_BESIDE * height, height),
+        };
+        let capital = (CAPITAL * shorter).max(LEAST_CAPITAL);
+        // As many as there is room for, all alike.
+        let panels = (1..=scales.len()).rev().find_map(|count| {
+            let share = ((height - capital) / count as f64 - capital).min(highest);
+            let panel = |scale| panel(scale, title(scale, scales), capital, [widest, share]);
+            scales[..count].iter().map(panel).collect::<Option<Vec<_>>>()
+        });
+        Self { panels: panels.unwrap_or_default(), capital }
+    }
+
+    /// Width of a strip that holds the panels, pixels; 0 without panels.
+    fn strip(&self) -> usize {
+        let widest = self.panels.iter().map(|panel| panel.width).fold(0.0, f64::max);
+        if self.panels.is_empty() { 0 } else { (widest + 2.0 * self.capital).ceil() as usize }
+    }
+}
+
+/// Draws legends at the right border, the first at the top; gives the number of those that have no room. A canvas for legends beside a picture has the
+/// strip of [`with_strip`] already.
+pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale], place: LegendPlace) -> u64 {
+    let [width, height] = canvas.size();
+    let Panels { panels, capital: margin } = Panels::new([width, height], scales, place);
     let stacked: f64 = panels.iter().map(|panel| panel.height + margin).sum();
-    let mut top = (0.5 * (height - stacked + margin)).round();
+    let mut top = (0.5 * (f64::from(height) - stacked + margin)).round();
     for panel in &panels {
-        panel.draw(canvas, width - margin - panel.width, top, capital);
+        panel.draw(canvas, f64::from(width) - margin - panel.width, top, margin);
         top += panel.height + margin;
     }
     (scales.len() - panels.len()) as u64
+}
+
+/// The layers of a displayed picture with an empty strip to the right, in which [`draw`] puts legends.
+pub(super) fn with_strip(layers: &Layers, scales: &[ColorScale]) -> Layers {
+    let [width, height] = layers.size;
+    let strip = Panels::new(layers.size, scales, LegendPlace::Beside).strip();
+    let mut wider = Layers { size: [width + strip as u32, height], ..Layers::default() };
+    for (name, data) in &layers.images {
+        let data = match data {
+            LayerData::Rgb(pixels) => LayerData::Rgb(widened(pixels, width, strip)),
+            LayerData::Scalar(values) => LayerData::Scalar(widened(values, width, strip)),
+            LayerData::Id(_) => continue,
+        };
+        wider.insert(name, data);
+    }
+    wider
+}
+
+/// Rows with so many zeros at their ends.
+fn widened<T: Copy + Default>(pixels: &[T], width: u32, strip: usize) -> Vec<T> {
+    let row = |row: &[T]| [row, &vec![T::default(); strip]].concat();
+    pixels.chunks(width.max(1) as usize).flat_map(row).collect()
 }
 
 /// Returns the title of a scale: its column, with its object if several scales have that column.
@@ -254,7 +302,7 @@ mod tests {
     fn drawn(size: [usize; 2], brightness: f32, scales: &[ColorScale]) -> (Vec<[f32; 3]>, u64) {
         let [width, height] = size;
         let mut samples = vec![brightness; 3 * width * height];
-        let left = draw(&mut Canvas::new(&mut samples, width as u32, 3), scales);
+        let left = draw(&mut Canvas::new(&mut samples, width as u32, 3), scales, LegendPlace::Over);
         (samples.as_chunks::<3>().0.to_vec(), left)
     }
 
@@ -307,6 +355,43 @@ mod tests {
         assert_eq!(drawn([960, 540], 0.5, &scales[..3]).1, 0);
         assert_eq!(drawn([40, 30], 0.5, &scales[..1]).1, 1);
         assert_eq!(drawn([960, 540], 0.5, &[]), (vec![[0.5; 3]; 960 * 540], 0));
+    }
+
+    #[test]
+    fn a_legend_beside_a_picture_covers_none_of_it_and_is_there_where_over_it_there_is_no_room() {
+        let long = survey_scale(
+            Some("temperature of the outer wall"),
+            PointColors::Distinct,
+            ScaleNumbers::Range([-273.15, 1e4]),
+        );
+        for size in [[320_u32, 240], [64, 240], [960, 540]] {
+            for scales in [vec![heights()], vec![heights(), long.clone()]] {
+                let count = (size[0] * size[1]) as usize;
+                let mut layers = Layers { size, ..Layers::default() };
+                layers.insert("beauty", LayerData::Rgb(vec![[1.0; 3]; count]));
+                layers.insert("alpha", LayerData::Scalar(vec![1.0; count]));
+                let wider = with_strip(&layers, &scales);
+                let mut samples = wider.rgb("beauty").expect("a layer").as_flattened().to_vec();
+                assert_eq!(
+                    draw(&mut Canvas::new(&mut samples, wider.size[0], 3), &scales, LegendPlace::Beside),
+                    0,
+                    "{size:?}"
+                );
+                assert_eq!(
+                    (wider.size[1], wider.scalar("alpha").expect("a layer").len()),
+                    (size[1], samples.len() / 3)
+                );
+                let strip = (wider.size[0] - size[0]) as usize;
+                assert!(strip > 20 && strip < size[1] as usize, "{strip} for {size:?}");
+                let rows = samples.chunks(3 * wider.size[0] as usize);
+                let (picture, legend): (Vec<_>, Vec<_>) = rows.map(|row| row.split_at(3 * size[0] as usize)).unzip();
+                assert!(picture.concat().iter().all(|sample| *sample == 1.0), "the picture is covered");
+                assert!(legend.concat().iter().filter(|sample| **sample > 0.9).count() > 100, "no text");
+                assert!(legend.iter().all(|row| row[..3].iter().all(|sample| *sample == 0.0)), "no margin");
+            }
+        }
+        let layers = Layers { size: [8, 8], ..Layers::default() };
+        assert_eq!(with_strip(&layers, &[]).size, [8, 8]);
     }
 
     #[test]

@@ -75,8 +75,20 @@ pub struct Params {
     /// Whether beauty holds a background that is not black. An EXR file with one is opaque: its `A` is 1, and the opacity of what lies before
     /// the background is `opacity.A`, so that no compositing program adds the background twice.
     pub has_background: bool,
-    /// Colour scales. A PNG file has a legend of each over its right border, in proportion to the picture.
+    /// Colour scales. PNG, JPEG and WebP files have a legend of each, in proportion to the picture.
     pub legend: Vec<ColorScale>,
+    /// Where the legends are.
+    pub legend_place: LegendPlace,
+}
+
+/// The place of legends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LegendPlace {
+    /// Over the right border of the picture, so that the file has the picture's size.
+    #[default]
+    Over,
+    /// In a strip to the right of the picture, which makes the file wider and covers nothing. Only [`write()`] and [`encode`] add the strip.
+    Beside,
 }
 
 /// Counts of the changes that made the file valid.
@@ -155,6 +167,9 @@ pub fn encode(
     params: &Params,
 ) -> Result<(Vec<u8>, WriteReport), Error> {
     let mut report = WriteReport::default();
+    let is_wider = params.legend_place == LegendPlace::Beside && format != Format::Exr;
+    let wider = is_wider.then(|| legend::with_strip(layers, &params.legend));
+    let layers = wider.as_ref().unwrap_or(layers);
     let bytes = match format {
         Format::Exr => exr_file::encode(layers, metadata, params, &mut report)?,
         Format::Png => png_file::encode(layers, metadata, params, &mut report)?,

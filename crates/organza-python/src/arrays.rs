@@ -67,6 +67,14 @@ pub(crate) fn shape(name: &str, array: &Bound<'_, PyAny>) -> PyResult<Vec<usize>
     Ok(array.shape().to_vec())
 }
 
+/// The sides of an array as Python writes them.
+pub(crate) fn shape_text(sides: &[usize]) -> String {
+    match sides {
+        [side] => format!("({side},)"),
+        sides => format!("({})", sides.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// The rows of an array of `rows` times `width` numbers.
 pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usize>, width: usize) -> PyResult<usize> {
     let found = shape(name, array)?;
@@ -77,7 +85,7 @@ pub(crate) fn check_rows(name: &str, array: &Bound<'_, PyAny>, rows: Option<usiz
     if !is_wide || rows.is_some_and(|rows| found[0] != rows) {
         let many = rows.map_or_else(|| "n".to_owned(), |rows| rows.to_string());
         let expected = if width == 1 { format!("the shape ({many},)") } else { format!("the shape ({many}, {width})") };
-        return Err(refused(name, &expected, &format!("{found:?}")));
+        return Err(refused(name, &expected, &shape_text(&found)));
     }
     if found[0] > MOST_ROWS {
         let found = found[0];

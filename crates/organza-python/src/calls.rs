@@ -128,14 +128,26 @@ impl Given {
     }
 }
 
-/// Draws a scene.
+/// Draws a scene. With `is_within_goal` settings give way to the time or the error that its `render` table states; else that is ignored with a warning, as
+/// pictures that belong together need the same settings.
 #[pyfunction]
-pub(crate) fn render(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<Picture> {
+#[pyo3(signature = (given, how, is_within_goal=false))]
+pub(crate) fn render(py: Python<'_>, mut given: Given, how: How<'_>, is_within_goal: bool) -> PyResult<Picture> {
     let options = how.options();
     let in_memory = given.take_memory()?;
     let work = move |progress: &Progress| {
         let scene = given.scene(in_memory, &options)?;
-        let picture = organza::render(&scene, &options, progress).map_err(|error| placed(error, &given.text))?;
+        let goal = scene.render.goal;
+        let in_words = |error| placed(error, &given.text);
+        if is_within_goal && goal.is_any() {
+            let within = organza::render_within(&scene, &goal, &options, progress, Files::default());
+            return Ok(Picture::within(&scene, &given.text, within.map_err(in_words)?));
+        }
+        let mut picture = organza::render(&scene, &options, progress).map_err(in_words)?;
+        if goal.is_any() {
+            let sentence = "`render` states a time or an error to keep to, which one picture of `organza.render` does, and these do not";
+            picture.warnings.push(sentence.to_owned());
+        }
         Ok(Picture::new(&scene, &given.text, picture))
     };
     run(py, how.threads, how.progress.as_ref(), work)

@@ -7,11 +7,10 @@ use numpy::{PyArray1, PyArrayMethods};
 use organza::{Error, SourceData};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use read::{Loaded, ReadParams, Rgba, TextureImage, TexturePlaces, Textures};
+use read::{Loaded, Painting, PaintingParts, ReadParams, Rgba, TextureImage, TexturePlaces, Textures};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::{Association, Column, Grid, Mesh, MeshColumn, RadianceImage, RawPoints, Relative};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// A mesh, points, a volume or an image in memory, which scenes name as `memory:NAME`.
 #[pyclass(frozen, module = "organza._organza")]
@@ -27,6 +26,22 @@ impl From<SourceData> for Data {
     }
 }
 
+/// The texture of a mesh as [`Data::arrays`] has it; the argument `painting` of [`Data::mesh`].
+#[derive(FromPyObject)]
+pub(crate) struct Painted<'py> {
+    /// (n, 2): (0, 0) is the upper left corner of the image.
+    #[pyo3(item)]
+    places: Bound<'py, PyAny>,
+    /// (n, 4), linear colours and opacities that the texture is multiplied by.
+    #[pyo3(item)]
+    tint: Option<Bound<'py, PyAny>>,
+    /// (height, width, 4), bytes of sRGB or linear numbers.
+    #[pyo3(item)]
+    texels: Bound<'py, PyAny>,
+    #[pyo3(item)]
+    stated_triangles: u64,
+}
+
 /// The image that a mesh is painted with: a PNG or JPEG file, or pixels.
 #[derive(FromPyObject)]
 pub(crate) enum Texture<'py> {
@@ -39,11 +54,11 @@ pub(crate) enum Texture<'py> {
 #[pymethods]
 impl Data {
     /// A mesh: vertices (n, 3), faces (m, 3) of indices, and by vertex normals, linear colours or bytes of sRGB, and opacities; columns by name, of
-    /// vertices (n,) and of faces (m,); places `uv` of a texture, (n, 2) or (m, 3, 2), with the texture. `unit_normals` are those of [`Self::arrays`].
+    /// vertices (n,) and of faces (m,); places `uv` of a texture, (n, 2) or (m, 3, 2), with the texture. `unit_normals` and `painting` are those of [`Self::arrays`].
     #[staticmethod]
     #[pyo3(signature = (
         vertices, faces, normals=None, colors=None, opacities=None, columns=None, face_columns=None, uv=None, texture=None,
-        unit_normals=None
+        unit_normals=None, painting=None
     ))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords of the call from Python")]
     fn mesh(
@@ -57,6 +72,7 @@ impl Data {
         uv: Option<&Bound<'_, PyAny>>,
         texture: Option<Texture<'_>>,
         unit_normals: Option<&Bound<'_, PyAny>>,
+        painting: Option<Painted<'_>>,
     ) -> PyResult<Self> {
         let positions = arrays::positions("vertices", vertices)?;
         let count = positions.len();
@@ -73,6 +89,10 @@ impl Data {
             columns: named,
             triangles,
         };
+        if let Some(painting) = painting {
+            let painting = painting_again(&painting, count)?;
+            return Ok(SourceData::Painted(mesh.into(), painting.into()).into());
+        }
         match (uv, texture) {
             (None, None) => {
                 let smooth = read::smoothed_in_memory("vertices", mesh, &ReadParams::default());
@@ -133,7 +153,7 @@ impl Data {
     ) -> PyResult<Self> {
         let sides = arrays::shape("values", values)?;
         let &[depth, height, width] = sides.as_slice() else {
-            return Err(refused("values", "the shape (nz, ny, nx)", &format!("{sides:?}")));
+            return Err(refused("values", "the shape (nz, ny, nx)", &arrays::shape_text(&sides)));
         };
         // Rows of the matrix as numpy has them.
         let directions = DMat3::from_cols_array_2d(&direction).transpose();
@@ -152,7 +172,7 @@ impl Data {
     fn image(pixels: &Bound<'_, PyAny>) -> PyResult<Self> {
         let sides = arrays::shape("pixels", pixels)?;
         let &[height, width, 3] = sides.as_slice() else {
-            return Err(refused("pixels", "the shape (height, width, 3)", &format!("{sides:?}")));
+            return Err(refused("pixels", "the shape (height, width, 3)", &arrays::shape_text(&sides)));
         };
         let side = |side: usize| u32::try_from(side).map_err(|_| refused("pixels", "fewer pixels a side", "too many"));
         let size = [side(width)?, side(height)?];
@@ -184,12 +204,11 @@ impl Data {
         self.notes.clone()
     }
 
-    /// Its arrays by the names of the arguments that make it again. A texture becomes colours of vertices, for which triangles are divided.
+    /// Its arrays by the names of the arguments that make it again, with the same bits.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let parts = PyDict::new(py);
         match &self.data {
-            SourceData::Mesh(_) | SourceData::Painted(..) => {
-                let mesh = &self.colored_mesh()?;
+            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
                 parts.set_item("vertices", table(py, placed(mesh.origin, &mesh.position))?)?;
                 let faces: Vec<u32> = mesh.triangles.as_flattened().to_vec();
                 let count = mesh.triangles.len();
@@ -206,6 +225,9 @@ impl Data {
                         columns.set_item(&column.name, PyArray1::from_slice(py, &column.values))?;
                     }
                     parts.set_item(name, columns)?;
+                }
+                if let SourceData::Painted(_, painting) = &self.data {
+                    parts.set_item("painting", painting_table(py, painting)?)?;
                 }
             }
             SourceData::Points(points) => {
@@ -241,19 +263,53 @@ impl Data {
     }
 }
 
-impl Data {
-    /// The mesh with all of its colours at vertices.
-    fn colored_mesh(&self) -> PyResult<Arc<Mesh>> {
-        match &self.data {
-            SourceData::Mesh(mesh) => Ok(mesh.clone()),
-            SourceData::Painted(mesh, painting) => {
-                let divided = painting.divided(mesh, 0.0, &ReadParams::default(), None);
-                let (mesh, _) = divided.map_err(|error| raised(&Error::from_read(Path::new("texture"), &error)))?;
-                Ok(mesh.into())
-            }
-            _ => Err(raised(&Error::Internal("a mesh that is none".into()))),
+/// The parts of a painting as arrays, for [`painting_again`].
+fn painting_table<'py>(py: Python<'py>, painting: &Painting) -> PyResult<Bound<'py, PyDict>> {
+    let no_parts = || raised(&Error::Internal("a painting of several materials in memory".into()));
+    let PaintingParts { places, tint, size, rgba, stated_triangles } =
+        read::parts_of_painting(painting).ok_or_else(no_parts)?;
+    let [width, height] = size.map(|side| side as usize);
+    let sides = [height, width, 4];
+    let table = PyDict::new(py);
+    table.set_item("places", PyArray1::from_slice(py, places.as_flattened()).reshape([places.len(), 2])?)?;
+    let tints = (!tint.is_empty()).then(|| PyArray1::from_slice(py, tint.as_flattened()).reshape([tint.len(), 4]));
+    table.set_item("tint", tints.transpose()?)?;
+    match rgba {
+        Rgba::Srgb(texels) => {
+            table.set_item("texels", PyArray1::from_slice(py, texels.as_flattened()).reshape(sides)?)?;
+        }
+        Rgba::Linear(texels) => {
+            table.set_item("texels", PyArray1::from_slice(py, texels.as_flattened()).reshape(sides)?)?;
         }
     }
+    table.set_item("stated_triangles", stated_triangles)?;
+    Ok(table)
+}
+
+/// The painting of a mesh of `vertices` from the arrays that [`painting_table`] made.
+fn painting_again(painted: &Painted<'_>, vertices: usize) -> PyResult<Painting> {
+    const NAME: &str = "painting";
+    arrays::check_rows("places", &painted.places, Some(vertices), 2)?;
+    let places = arrays::column("places", &painted.places, |value| value as f32)?;
+    let tint = match &painted.tint {
+        Some(tint) => {
+            arrays::check_rows("tint", tint, Some(vertices), 4)?;
+            arrays::column("tint", tint, |value| value as f32)?
+        }
+        None => Vec::new(),
+    };
+    let TextureImage::Texels { size, rgba } = texels(NAME, &painted.texels)? else {
+        return Err(refused(NAME, "texels", "the path of a file"));
+    };
+    let parts = PaintingParts {
+        places: places.as_chunks().0.to_vec(),
+        tint: tint.as_chunks().0.to_vec(),
+        size,
+        rgba,
+        stated_triangles: painted.stated_triangles,
+    };
+    let made = read::painting_of_parts(NAME, parts, &ReadParams::default());
+    made.map_err(|error| raised(&Error::from_read(Path::new(&error.file), &error)))
 }
 
 /// The mesh with the colours of a texture.
@@ -269,7 +325,7 @@ fn textured(mesh: Mesh, uv: &Bound<'_, PyAny>, texture: &Texture<'_>) -> PyResul
         [rows, 3, 2] if *rows == faces => TexturePlaces::Corners(places.as_chunks().0.to_vec()),
         _ => {
             let expected = format!("the shape ({vertices}, 2) of vertices or ({faces}, 3, 2) of corners of triangles");
-            return Err(refused("uv", &expected, &format!("{sides:?}")));
+            return Err(refused("uv", &expected, &arrays::shape_text(&sides)));
         }
     };
     let image = match texture {
@@ -292,7 +348,7 @@ fn texels(name: &str, pixels: &Bound<'_, PyAny>) -> PyResult<TextureImage> {
     let sides = arrays::shape(name, pixels)?;
     let &[height, width, channels @ (3 | 4)] = sides.as_slice() else {
         let expected = "a path, or an image of the shape (height, width, 3) or (height, width, 4)";
-        return Err(refused(name, expected, &format!("{sides:?}")));
+        return Err(refused(name, expected, &arrays::shape_text(&sides)));
     };
     let side = |side: usize| u32::try_from(side).map_err(|_| refused(name, "fewer pixels a side", "too many"));
     let size = [side(width)?, side(height)?];

@@ -5,15 +5,18 @@ use crate::errors::{raised, refused};
 use crate::wording;
 use convert::ColorScale;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use organza::output::{self, Format, Metadata, Params, Target};
-use organza::scene::{LAYER_NAMES, Scene};
-use organza::{Error, Render};
+use organza::output::{self, Format, LegendPlace, Metadata, Params, Target};
+use organza::scene::{Goal, LAYER_NAMES, Scene};
+use organza::{Error, Expected, GivenUp, Render, WithinGoal};
 use organza_judge::documents;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::{Value, json};
 use splat_core::{LayerData, Layers};
 use std::path::PathBuf;
+
+/// The column that the argument `values` of points and meshes becomes.
+const VALUES: &str = "value";
 
 /// A picture that was drawn.
 #[pyclass(frozen, module = "organza._organza")]
@@ -28,10 +31,41 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
+    /// A picture that was drawn with the scene's own settings.
     pub(crate) fn new(scene: &Scene, text: &str, render: Render) -> Self {
+        Self::with_goal(scene, text.to_owned(), render, Value::Null)
+    }
+
+    /// A picture that keeps to a goal. Its text has the settings that were taken, so that it draws the same picture.
+    pub(crate) fn within(scene: &Scene, text: &str, within: WithinGoal) -> Self {
+        let WithinGoal { render, given_up, expected, taken, error, is_probed, ladder } = within;
+        let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
+        let rung = |rung: &Expected| {
+            json!({
+                "antialias": rung.antialias, "splat_share": rung.splat_share, "sets": rung.sets,
+                "seconds": rung.time.as_secs_f64(), "rmse": rung.error.rmse, "flip": rung.error.flip,
+            })
+        };
+        let Goal { budget_ms, max_rmse, max_flip } = scene.render.goal;
+        let goal = json!({
+            "budget_ms": budget_ms,
+            "max_rmse": max_rmse,
+            "max_flip": max_flip,
+            "expected_seconds": expected.as_secs_f64(),
+            "taken_seconds": taken.as_secs_f64(),
+            "expected_rmse": error.rmse,
+            "expected_flip": error.flip,
+            "errors_of": if is_probed { "this scene" } else { "typical scenes" },
+            "given_up": given_up.iter().map(setting).collect::<Value>(),
+            "ladder": ladder.iter().map(rung).collect::<Value>(),
+        });
+        Self::with_goal(scene, with_taken(text, &given_up), render, goal)
+    }
+
+    fn with_goal(scene: &Scene, text: String, render: Render, goal: Value) -> Self {
         let metadata = Metadata {
             scene_sha256: scene.sha256.clone(),
-            scene: text.to_owned(),
+            scene: text,
             technique: render.plan.technique.clone(),
             left_out: render.plan.left_out_text(),
             seed: scene.render.seed,
@@ -44,12 +78,13 @@ impl Picture {
             "plan": documents::plan_json(&render.plan),
             "cost": documents::cost_json(&render.cost),
             "predicted": documents::predicted_json(&render.predicted),
+            "goal": goal,
             "warnings": render.warnings,
             "notes": render.notes,
         });
         let facts = wording::document(facts);
         let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
-        let scales = Some(render.scales);
+        let scales = Some(render.scales.into_iter().map(named).collect());
         Self { metadata, facts: facts.to_string(), has_background, layers: render.layers, scales }
     }
 
@@ -62,8 +97,16 @@ impl Picture {
         Ok(())
     }
 
-    fn params(&self, transparent: bool, deep: bool, half: bool, legend: bool) -> PyResult<Params> {
-        let legend = match (&self.scales, legend) {
+    /// How files store it; `legend` is the place of legends, `"over"` or `"beside"`, and `None` leaves them out.
+    fn params(&self, transparent: bool, deep: bool, half: bool, legend: Option<&str>) -> PyResult<Params> {
+        let legend_place = match legend {
+            None | Some("over") => LegendPlace::Over,
+            Some("beside") => LegendPlace::Beside,
+            Some(other) => {
+                return Err(refused("legend", "True, False, 'over' or 'beside'", &format!("'{other}'")));
+            }
+        };
+        let legend = match (&self.scales, legend.is_some()) {
             (_, false) => Vec::new(),
             (Some(scales), true) => scales.clone(),
             (None, true) => {
@@ -71,8 +114,32 @@ impl Picture {
                 return Err(refused("legend", "a picture that was drawn in this process", found));
             }
         };
-        Ok(Params { half, deep, transparent, has_background: self.has_background, legend })
+        Ok(Params { half, deep, transparent, has_background: self.has_background, legend, legend_place })
     }
+}
+
+/// A scale with the name that a user gave: `values` of a call are a column of no name, and their object has one.
+fn named(scale: ColorScale) -> ColorScale {
+    let column = scale.column.filter(|column| column != VALUES);
+    ColorScale { column, ..scale }
+}
+
+/// The text of a scene with the settings that were taken in the place of its goal: in JSON as keys, in TOML as comments with the options of the command.
+fn with_taken(text: &str, given_up: &[GivenUp]) -> String {
+    let Ok(mut document) = serde_json::from_str::<Value>(text) else {
+        let taken = given_up.iter().map(|setting| format!("{}={}", setting.key, setting.taken));
+        let no_goal = Goal::KEYS.iter().map(|key| format!("render.{key}=none"));
+        return taken.chain(no_goal).fold(text.to_owned(), |text, change| text + "\n# --set " + &change);
+    };
+    if let Some(render) = document.get_mut("render").and_then(Value::as_object_mut) {
+        Goal::KEYS.iter().for_each(|key| drop(render.remove(*key)));
+    }
+    for GivenUp { key, taken, .. } in given_up {
+        let value = serde_json::from_str(taken).unwrap_or_else(|_| json!(taken));
+        let place = key.split('.').fold(&mut document, |table, part| &mut table[part]);
+        *place = value;
+    }
+    document.to_string()
 }
 
 #[pymethods]
@@ -90,7 +157,11 @@ impl Picture {
             };
             let sides = arrays::shape(&name, &array)?;
             let (&[height, width] | &[height, width, 3]) = sides.as_slice() else {
-                return Err(refused(&name, "the shape (height, width) or (height, width, 3)", &format!("{sides:?}")));
+                return Err(refused(
+                    &name,
+                    "the shape (height, width) or (height, width, 3)",
+                    &arrays::shape_text(&sides),
+                ));
             };
             let side = |side: usize| u32::try_from(side).map_err(|_| refused(&name, "fewer pixels a side", "too many"));
             let size = [side(width)?, side(height)?];
@@ -192,7 +263,7 @@ impl Picture {
     #[pyo3(signature = (transparent=false))]
     fn srgb8<'py>(&self, py: Python<'py>, transparent: bool) -> PyResult<Bound<'py, PyArray3<u8>>> {
         self.check_transparent(transparent)?;
-        let params = self.params(transparent, false, false, false)?;
+        let params = self.params(transparent, false, false, None)?;
         let bytes = py.detach(|| output::displayed_bytes(&self.layers, &self.metadata, &params));
         let bytes = bytes.map_err(|error| raised(&Error::Output(error)))?;
         let [width, height] = self.layers.size.map(|side| side as usize);
@@ -200,8 +271,14 @@ impl Picture {
     }
 
     /// The bytes of a PNG file of it.
-    #[pyo3(signature = (transparent=false, deep=false, legend=false))]
-    fn png<'py>(&self, py: Python<'py>, transparent: bool, deep: bool, legend: bool) -> PyResult<Bound<'py, PyBytes>> {
+    #[pyo3(signature = (transparent=false, deep=false, legend=None))]
+    fn png<'py>(
+        &self,
+        py: Python<'py>,
+        transparent: bool,
+        deep: bool,
+        legend: Option<&str>,
+    ) -> PyResult<Bound<'py, PyBytes>> {
         self.check_transparent(transparent)?;
         let params = self.params(transparent, deep, false, legend)?;
         let encoded = py.detach(|| output::encode(&self.layers, &self.metadata, Format::Png, &params));
@@ -210,7 +287,8 @@ impl Picture {
     }
 
     /// Writes it, as a PNG or OpenEXR file by the name.
-    #[pyo3(signature = (path, transparent=false, deep=false, half=false, legend=false, force=false))]
+    #[pyo3(signature = (path, transparent=false, deep=false, half=false, legend=None, force=false))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords of the call from Python")]
     fn save(
         &self,
         py: Python<'_>,
@@ -218,7 +296,7 @@ impl Picture {
         transparent: bool,
         deep: bool,
         half: bool,
-        legend: bool,
+        legend: Option<&str>,
         force: bool,
     ) -> PyResult<Vec<String>> {
         self.check_transparent(transparent)?;
@@ -239,7 +317,7 @@ impl Picture {
         ];
         let told = counts.into_iter().filter(|(count, _)| *count > 0);
         let mut said: Vec<String> = told.map(|(count, what)| format!("{}: {count} {what}", path.display())).collect();
-        if legend && params.legend.is_empty() {
+        if legend.is_some() && params.legend.is_empty() {
             said.push("there is no legend: nothing that is drawn has a number that its colour stands for".to_owned());
         }
         Ok(said)

@@ -12,7 +12,52 @@ pub(crate) const MADE: &str = "scene.json";
 const MARK: &str = "memory:";
 
 /// Words of a command line, and those of Python; longer ones come before those that they contain.
-const WORDS: [(&str, &str); 35] = [
+const WORDS: [(&str, &str); 59] = [
+    ("move or strengthen a [[light]], or add [ambient]", "move or strengthen a light, or set ambient.color"),
+    (
+        "add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \"unlit\"",
+        "call `scene.light.sun()`, set ambient.color, or take a material with `emission` or shading=\"unlit\"",
+    ),
+    (" of that [[light]],", " of that [[light]]"),
+    (" of that [[light]]", " of that light, or render.shadow.cells of all,"),
+    (
+        "technique = \"sheets\" with [render.sheets] slicing = \"half_vector\" and scattering = \"forward_and_back\"",
+        "render.technique = \"sheets\", render.sheets.slicing = \"half_vector\" and render.sheets.scattering = \"forward_and_back\"",
+    ),
+    ("set camera = \"auto\"", "call `scene.camera.orbit()`"),
+    ("scale = \"log\"", "log_scale = true"),
+    (
+        "transfer = [{ value = 0, color = [1, 1, 1], extinction = 0 }, …]",
+        "transfer=[{\"value\": 0, \"color\": [1, 1, 1], \"extinction\": 0}, …]",
+    ),
+    ("use `mesh = ` or `volume = ` for this file", "`scene.add` takes this file as what it is"),
+    ("use `mesh = ` or `points = ` for this file", "`scene.add` takes this file as what it is"),
+    ("use `points = ` or `volume = ` for this file", "`scene.add` takes this file as what it is"),
+    (
+        "use `volume = ` or `isosurface = ` for this file, whose values are amounts",
+        "`scene.add_volume` and `scene.add_isosurface` show this file, whose values are amounts",
+    ),
+    ("use `volume = ` or `isosurface = ` for this file", "`scene.add` takes this file as what it is"),
+    (
+        "`mesh = ` draws the surface of each, `volume = ` takes them for amounts",
+        "`scene.add_labels` draws the surface of each, `scene.add_volume` takes them for amounts",
+    ),
+    (" in the [[object]] draws nothing there", " as a key of the object draws nothing there"),
+    ("`[ambient]` stands for it", "ambient.color stands for it"),
+    (
+        "name it in a scene: [background] environment = \"FILE\"",
+        "`scene.set(\"background.environment\", \"FILE\")` shows it",
+    ),
+    (
+        "such as { normal = [0, 1, 0], point = [0, 0.5, 0] } or { box = [[-1, -1, -1], [1, 1, 1]] }",
+        "such as {\"normal\": [0, 1, 0], \"point\": [0, 0.5, 0]} or {\"box\": [[-1, -1, -1], [1, 1, 1]]}",
+    ),
+    (
+        "or say `auto = true` for a camera that sees all objects",
+        "or call `scene.camera.orbit()`, which sees all objects",
+    ),
+    ("`array` of a scene or --color-by", "`array` or `color_by`"),
+    ("--technique chooses one", "render.technique chooses one"),
     ("write PATH=VALUE, such as --set render.points.exact=true", ""),
     ("leave out `array`, or `--color-by`, which names it on the command line", "leave out `array`, or `color_by`"),
     (
@@ -26,9 +71,12 @@ const WORDS: [(&str, &str); 35] = [
     ("--finer N doubles every end N times", "`finer=N` doubles every end N times"),
     ("; `--background COLOUR` takes the place of both", ""),
     ("leave out --sandbox if you trust the scene", "move the file into the folder of the scene"),
-    ("use --budget", "use a budget of"),
+    ("use --budget ", "use budget_ms="),
+    ("--max-rmse ", "max_rmse="),
+    ("--max-flip ", "max_flip="),
     ("a smaller --size", "a smaller `size`"),
     ("--turntable: ", ""),
+    ("the scene scene.json", "the scene"),
     ("draw it with --frames", "draw its frames by the command"),
     ("leave the option out", "leave it out"),
     ("--preset labels", "`preset=\"labels\"`"),
@@ -69,7 +117,73 @@ const ARGUMENTS: [(&str, &str); 8] = [
 pub(crate) fn sentence(text: &str) -> String {
     let text = without_mark(&without_option(text));
     let text = WORDS.iter().fold(text, |text, (before, after)| text.replace(before, after));
-    exposed(&text)
+    assigned(&exposed(&text))
+}
+
+/// A sentence whose assignments in TOML are those of Python: `visible = false` becomes `visible=False`, and `render.seed = 3` becomes
+/// `scene.set("render.seed", 3)`.
+fn assigned(text: &str) -> String {
+    const SIGN: &str = " = ";
+    let mut made = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once(SIGN) {
+        let is_of_key = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+        let key = &before[before.trim_end_matches(is_of_key).len()..];
+        let value = if key.starts_with(|c: char| c.is_ascii_lowercase()) { value_at(after) } else { None };
+        let Some((value, length)) = value else {
+            made = made + before + SIGN;
+            rest = after;
+            continue;
+        };
+        let sentence = &before[..before.len() - key.len()];
+        if key.contains('.') {
+            let verbs = ["set ", "use "].into_iter().find_map(|verb| sentence.strip_suffix(verb));
+            made += &verbs.map_or(sentence.to_owned(), |start| format!("{start}call "));
+            made += &format!("scene.set(\"{key}\", {})", literal(&value));
+        } else {
+            made += &format!("{sentence}{key}={}", literal(&value));
+        }
+        rest = &after[length..];
+    }
+    made + rest
+}
+
+/// The value in TOML that a text begins with, and its length in bytes.
+fn value_at(text: &str) -> Option<(Value, usize)> {
+    let mut depth = 0_usize;
+    let mut is_quoted = false;
+    let ends = |(_, c): &(usize, char)| {
+        match c {
+            '"' => is_quoted = !is_quoted,
+            '[' | '{' if !is_quoted => depth += 1,
+            ']' | '}' if !is_quoted => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        let is_of_word = c.is_ascii_alphanumeric() || ['.', '+', '-', '_'].contains(c);
+        depth == 0 && !is_quoted && !is_of_word
+    };
+    let (at, end) = text.char_indices().find(ends).unwrap_or((text.len(), ' '));
+    // A closing quote or bracket belongs to the value; a full stop ends the sentence.
+    let length = if ['"', ']', '}'].contains(&end) { at + 1 } else { text[..at].trim_end_matches('.').len() };
+    let table: Value = toml::from_str(&format!("value = {}", &text[..length])).ok()?;
+    Some((table.get("value")?.clone(), length))
+}
+
+/// A value as Python writes it.
+fn literal(value: &Value) -> String {
+    let list = |items: Vec<String>| items.join(", ");
+    match value {
+        Value::Bool(true) => "True".to_owned(),
+        Value::Bool(false) => "False".to_owned(),
+        Value::Array(items) => format!("[{}]", list(items.iter().map(literal).collect())),
+        Value::Object(entries) => {
+            format!(
+                "{{{}}}",
+                list(entries.iter().map(|(key, value)| format!("\"{key}\": {}", literal(value))).collect())
+            )
+        }
+        other => other.to_string(),
+    }
 }
 
 /// A document whose sentences are in the words of Python.
@@ -143,10 +257,11 @@ fn without_option(text: &str) -> String {
         return text.to_owned();
     };
     let Some((_, rest)) = rest.split_once(": ") else { return text.to_owned() };
-    match path {
-        "camera.size" => format!("size: {}", rest.strip_prefix("`size`: ").unwrap_or(rest)),
-        path => format!("{path}: {rest}"),
-    }
+    // The name stands before the sentence already.
+    let key = path.rsplit_once('.').map_or(path, |(_, key)| key);
+    let rest = rest.strip_prefix(&format!("`{key}`: ")).unwrap_or(rest);
+    let argument = if path == "camera.size" { "size" } else { path };
+    format!("{argument}: {rest}")
 }
 
 /// A sentence that names data in memory by its object alone.

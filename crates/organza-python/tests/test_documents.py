@@ -82,7 +82,7 @@ def test_explain_is_that_of_the_command(command, tmp_path):
         words = ["--measure"] if measure else []
         assert timeless(og.explain(place, measure=measure)) == timeless(worded(printed(command, "explain", place, *words)))
     file = ASSETS / "meshes" / "dart.off"
-    assert timeless(og.explain(file, size=SMALL)) == timeless(printed(command, "explain", file, "--size", "48x36"))
+    assert timeless(og.explain(file, size=SMALL)) == timeless(worded(printed(command, "explain", file, "--size", "48x36")))
 
 
 def test_explain_names_the_effects_of_arrays():

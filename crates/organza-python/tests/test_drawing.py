@@ -1,5 +1,6 @@
 """Pictures from arrays and from files: the same bits, whichever way data came in."""
 
+import json
 import pickle
 import subprocess
 import sys
@@ -249,7 +250,9 @@ def test_others_run_while_a_picture_is_drawn():
 
 def test_an_interrupt_ends_a_picture():
     program = (
-        "import sys, numpy as np, organza as og\n"
+        "import signal, sys, numpy as np, organza as og\n"
+        # Shells start what they leave in the background without interrupts, which children inherit.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "scene = og.Scene()\n"
         "scene.add_volume(np.random.default_rng(0).random((150, 150, 150)), transfer=og.transfer())\n"
         "scene.set('render.technique', 'particles')\n"
@@ -313,3 +316,38 @@ def test_an_effect_has_its_predicted_seconds():
     effect = next(effect for effect in predicted["effects"] if effect["name"] == "object.scan")
     assert effect["seconds"] > 0.0 and set(effect) == {"name", "seconds", "bytes", "passes"}
     assert set(predicted) == {"seconds", "threads", "seconds_of_one_core", "by", "passes", "announcement", "effects"}
+
+
+def test_a_picture_keeps_to_an_error_or_a_time(tmp_path):
+    scene = volume_scene(ball(), name="ball")
+    scene.set("render.technique", "particles")
+    scene.set("render.particles.repeat_level", 64)
+    plain = og.render(scene, size=SMALL)
+    assert plain.goal is None
+    picture = og.render(scene, size=SMALL, max_rmse=0.2)
+    assert picture.goal["max_rmse"] == 0.2 and picture.goal["budget_ms"] is None
+    assert any(setting["key"] == "render.particles.repeat_level" for setting in picture.goal["given_up"]), picture.goal
+    assert picture.goal["expected_rmse"] <= 0.2 and len(picture.goal["ladder"]) > 1
+    # The settings that were taken draw the same picture, and its file tells them.
+    again = volume_scene(ball(), name="ball")
+    again.set("render.technique", "particles")
+    for setting in picture.goal["given_up"]:
+        again.set(setting["key"], json.loads(setting["taken"]))
+    assert np.array_equal(og.render(again, size=SMALL).rgb, picture.rgb)
+    picture.save(tmp_path / "a.png")
+    image = pytest.importorskip("PIL.Image").open(tmp_path / "a.png")
+    told = json.loads(image.text["organza:scene"])["render"]
+    assert "max_rmse" not in told and told["particles"]["repeat_level"] == again._document["render"]["particles"]["repeat_level"]
+    # A key of the scene is the same as an argument.
+    scene.set("render.max_rmse", 0.2)
+    assert og.render(scene, size=SMALL).goal["given_up"] == picture.goal["given_up"]
+    assert og.render(scene, size=SMALL, budget_ms=600_000).goal["budget_ms"] == 600_000
+    # Pictures of a turn have the same settings each.
+    with pytest.warns(UserWarning, match="a time or an error to keep to"):
+        frames = list(og.turntable(scene, 2, size=SMALL))
+    assert all(frame.goal is None for frame in frames)
+    for wrong, said in [({"budget_ms": 0}, "budget_ms: expected .*1 to 86400000"), ({"max_flip": 2}, "max_flip.*at most 1"), ({"max_rmse": "a"}, "max_rmse: expected a finite number")]:
+        with pytest.raises(og.InputError, match=said):
+            og.render(scene, size=SMALL, **wrong)
+    with pytest.raises(og.LimitError, match="use budget_ms=[0-9]+, or a smaller `size`"):
+        og.render(scene, size=(200, 150), budget_ms=1)

@@ -39,6 +39,33 @@ def test_an_isosurface_shows_a_second_volume(tmp_path):
     picture.save(tmp_path / "legend.png", legend=True)
     assert (tmp_path / "plain.png").read_bytes() != (tmp_path / "legend.png").read_bytes()
     assert scene.objects == ["iso"]
+    # Beside the picture a legend covers nothing of it.
+    image_module = pytest.importorskip("PIL.Image")
+    for ending in ("png", "webp"):
+        picture.save(tmp_path / f"beside.{ending}", legend="beside")
+        beside = np.asarray(image_module.open(tmp_path / f"beside.{ending}"))
+        assert beside.shape[0] == 240 and 340 < beside.shape[1] < 480
+        assert np.array_equal(beside[:, :320], picture.to_srgb8()) and beside[:, 320:].max() > 200
+    picture.save(tmp_path / "over.png", legend="over")
+    assert (tmp_path / "over.png").read_bytes() == (tmp_path / "legend.png").read_bytes()
+    for wrong in ("below", 2):
+        with pytest.raises(og.InputError, match=r"legend: expected True, False, 'over' or 'beside', found"):
+            picture.save(tmp_path / "wrong.png", legend=wrong)
+
+
+def test_a_legend_has_the_name_of_the_object_where_values_have_none(tmp_path):
+    image_module = pytest.importorskip("PIL.Image")
+
+    def strip(name: str, **shown: object) -> bytes:
+        scene = og.Scene()
+        scene.add_points(np.eye(3), radius=0.2, clim=(0, 2), name=name, **shown)
+        picture = og.render(scene, size=(160, 120))
+        picture.save(tmp_path / "a.png", legend="beside")
+        return np.asarray(image_module.open(tmp_path / "a.png"))[:, 160:].tobytes()
+
+    assert strip("heat", values=np.arange(3.0)) != strip("flow", values=np.arange(3.0))
+    named = {"columns": {"heat": np.arange(3.0)}, "color_by": "heat"}
+    assert strip("one", **named) == strip("two", **named) == strip("heat", values=np.arange(3.0))
 
 
 def test_a_field_has_a_lattice_of_its_own():

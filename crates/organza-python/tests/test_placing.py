@@ -197,3 +197,24 @@ def test_arrays_beside_data_that_stands_otherwise_are_named():
     scene.set("object.scan.transform", {"up": "z"})
     scene.remove("moved")
     assert said not in scene.notes
+
+
+def test_an_isosurface_is_framed_without_the_empty_voxels_around_it():
+    z, y, x = np.indices((40, 40, 40))
+    distance = np.sqrt((x - 9.2) ** 2 + (y - 20.0) ** 2 + (z - 30.5) ** 2)
+    scene = og.Scene()
+    scene.add_isosurface(distance, 4.0, inside="below", name="ball")
+    shown = (og.render(scene, size=(64, 48)).alpha > 0.5).any(axis=1).sum()
+    # The ball fills nine tenths of the height, of which the volume's box would leave it a fifth.
+    assert abs(shown / 48 - 0.9) < 0.05, shown
+    scene.camera.orbit(fit=0.5)
+    assert abs((og.render(scene, size=(64, 48)).alpha > 0.5).any(axis=1).sum() / 48 - 0.5) < 0.05
+
+
+def test_a_turn_at_any_elevation_leaves_a_border():
+    scene = og.Scene()
+    scene.add_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    scene.camera.orbit(elevation=30)
+    for picture in og.turntable(scene, 4, size=(64, 48)):
+        border = np.concatenate([picture.alpha[[0, -1]].ravel(), picture.alpha[:, [0, -1]].ravel()])
+        assert picture.alpha.max() > 0.9 and border.max() == 0.0

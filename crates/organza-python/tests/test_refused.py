@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -120,6 +121,10 @@ REFUSED = {
     "a key of no sun": (lambda: scene().light.sun(shape=3, name="noon"), "light 'noon': expected one of azimuth, elevation, .*found `shape`$"),
     "a number for a size of points": (lambda: scene().add_points(PLACES, point_size=3), "found `point_size`; `radius` takes a number"),
     "a column for values": (lambda: scene().add_points(PLACES, values="temperature"), "values: .* found the text 'temperature'; `color_by='temperature'`"),
+    "values of no number": (lambda: scene().add_points(PLACES, values=[0, 1, np.nan, 2], name="scan"), r"object 'scan', values: expected finite numbers, found nan in row 2; leave such rows out"),
+    "values of a mesh of no number": (lambda: scene().add_mesh(np.eye(3), [[0, 1, 2]], values=[0, np.inf, 1], name="m"), r"object 'm', values: expected finite numbers, found inf in row 1"),
+    "a shape of two sides": (lambda: scene().add_volume(np.zeros((3, 2))), r"values: expected the shape \(nz, ny, nx\), found \(3, 2\)"),
+    "a shape of one side": (lambda: scene().add_points(PLACES, values=[1, 2]), r"values: expected the shape \(4,\), found \(2,\)"),
     "points of no number": (lambda: scene().add_points([[0, 0, 0], [np.nan, 0, 0]], name="scan"), r"object 'scan', positions: .*\[nan, 0.0, 0.0\] in row 1; leave such rows out"),
     "faces of VTK": (lambda: scene().add_mesh(PLACES, [3, 0, 1, 2, 3, 1, 2, 3], name="net"), r"object 'net', faces: .*`faces.reshape\(-1, 4\)\[:, 1:\]`"),
     "four sides of VTK": (lambda: scene().add_mesh(PLACES, [4, 0, 1, 2, 3]), r"faces: expected the shape \(m, 4\).*`faces.reshape\(-1, 5\)"),
@@ -149,7 +154,7 @@ def test_a_wrong_scene_has_file_and_line(tmp_path):
 def test_too_much_memory_is_refused_before_anything_is_drawn():
     scene = og.Scene()
     scene.add_volume(np.zeros((64, 64, 64)), transfer=og.transfer())
-    with pytest.raises(og.LimitError, match="bytes"):
+    with pytest.raises(og.LimitError, match="^the scene needs [0-9]+ bytes"):
         og.render(scene, size=SMALL, max_memory=1000)
     assert issubclass(og.LimitError, MemoryError) and issubclass(og.InputError, ValueError)
 
@@ -210,8 +215,23 @@ def test_calls_that_draw_take_the_same_arguments():
     own = {og.turntable: {"frames"}, og.explain: {"measure"}, og.view: {"height"}, og.dask.frames: {"count"}, og.dask.sets: {"count", "each", "seed"}}
     # What a page and an explanation have no use for, and what tasks on other machines cannot tell.
     less = {og.view: {"threads", "transparent"}, og.explain: {"transparent"}, og.dask.frames: {"progress"}, og.dask.sets: {"progress"}}
+    # Pictures that belong together have the same settings, whatever time each takes.
+    goal = {"budget_ms", "max_rmse", "max_flip"}
     for call, found in names.items():
-        assert found == (names[og.render] | own.get(call, set())) - less.get(call, set()), call
+        assert found == (names[og.render] | own.get(call, set())) - less.get(call, set()) - (set() if call is og.render else goal), call
+
+
+def messages(*without: str) -> Iterator[str]:
+    """The texts in the code of the renderer, without those of the command and its tests, and without those of some files by their names."""
+    for path in sorted(REPOSITORY.glob("crates/*/src/**/*.rs")):
+        part = path.parts[len(REPOSITORY.parts) + 1]
+        if part in ("organza-cli", "organza-python", "organza-view") or path.stem in ("tests", *without):
+            continue
+        code = path.read_text(encoding="utf-8").split("#[cfg(test)]")[0]
+        code = "\n".join(line for line in code.splitlines() if not line.strip().startswith("//"))
+        for text in re.findall(r'"((?:[^"\\]|\\.)*)"', code, re.DOTALL):
+            # A text goes on after the blanks of the next line.
+            yield re.sub(r"\\\n\s*", "", text).replace('\\"', '"')
 
 
 def test_no_message_has_the_words_of_the_command_line():
@@ -220,18 +240,42 @@ def test_no_message_has_the_words_of_the_command_line():
     # Options of other programs, and variables of a style sheet.
     foreign = ("--raw", "--compress", "--accent", "--ink", "--soft", "--grid", "--faint", "--ground")
     # Messages of the command alone: what its options are called, and what Python cannot ask for.
-    command = ("--allow-path", "--packed", "--labels", "--set ", "--effect ", "--frames {", "--turntable {", "--max-rmse", "--max-flip", "--backend {")
-    left = []
-    for path in sorted(REPOSITORY.glob("crates/*/src/**/*.rs")):
-        if path.parts[len(REPOSITORY.parts) + 1] in ("organza-cli", "organza-python", "organza-view"):
-            continue
-        lines = path.read_text(encoding="utf-8").split("#[cfg(test)]")[0].splitlines()
-        for text in re.findall(r'"((?:[^"\\]|\\.)*)"', "\n".join(line for line in lines if not line.strip().startswith("//"))):
-            if option.search(text) and not any(known in text for known in foreign + command):
-                said = og._organza.in_words(text)
-                left += [said] if option.search(said) else []
-    assert not left, left
+    command = ("--allow-path", "--packed", "--labels", "--set ", "--effect ", "--frames {", "--turntable {", "--backend {")
+    found = [text for text in messages() if option.search(text) and not any(known in text for known in foreign + command)]
+    left = [said for said in map(og._organza.in_words, found) if option.search(said)]
+    assert len(found) > 30 and not left, left
     assert og._organza.in_words("memory:scan: no memory: none") == "scan: no memory: none"
+
+
+def test_no_message_has_the_words_of_a_scene_file():
+    """Tables and keys that a message of the renderer names are calls and arguments of Python."""
+    toml = re.compile(r"\[\[[a-z]+\]\]|\[(?:ambient|background|camera|render)[a-z_.]*\]|\b[a-z_]+ = (?:\"|\[|\{|[0-9]|true|false)|`[a-z_]+ = `")
+    # First scenes are TOML themselves.
+    texts = messages("first_scene", "lamps", "look", "point_colors", "html", "plot", "changes", "json", "write")
+    filled = (re.sub(r"\{[^{}= ]*\}", "1", text.replace("{{", "⟨").replace("}}", "⟩")).replace("⟨", "{").replace("⟩", "}") for text in texts)
+    found = [text for text in filled if toml.search(text)]
+    left = [said for said in map(og._organza.in_words, found) if toml.search(said)]
+    assert len(found) > 60 and not left, left
+
+
+SAID = {
+    'say which one counts: `transform = { up = "z" }`, or `auto = true`': 'say which one counts: `transform={"up": "z"}`, or `auto=True`',
+    "move either, or set visible = false": "move either, or set visible=False",
+    "it takes long. Set render.points.exact = true.": 'it takes long. Set scene.set("render.points.exact", True).',
+    'use render.sheets.slicing = "view", or another': 'call scene.set("render.sheets.slicing", "view"), or another',
+    "nodata = -3.5 in the [[object]] draws nothing there": "nodata=-3.5 as a key of the object draws nothing there",
+    "shadow_cells = 9 of that [[light]], the most that fit, leave 3 %": "shadow_cells=9 of that light, or render.shadow.cells of all, the most that fit, leave 3 %",
+    "shadow_cells = 9 of that [[light]] leaves a part": "shadow_cells=9 of that light, or render.shadow.cells of all, leaves a part",
+    "a sentence in which a = b, and 1 = 1": "a sentence in which a = b, and 1 = 1",
+    "a text that ends in a = ": "a text that ends in a = ",
+    'an open one: a = "x': 'an open one: a = "x',
+    "no letters: ö = [1, 2": "no letters: ö = [1, 2",
+}
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_assignments_are_those_of_python(said):
+    assert og._organza.in_words(said) == SAID[said]
 
 
 def test_malformed_calls_never_end_the_interpreter():

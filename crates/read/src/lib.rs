@@ -60,7 +60,10 @@ pub use meshes::paint::Painting;
 #[cfg(feature = "textures")]
 pub use meshes::rgba::Rgba;
 #[cfg(feature = "ply")]
-pub use meshes::textured::{TextureImage, TexturePlaces, smoothed_in_memory, textured_in_memory};
+pub use meshes::textured::{
+    PaintingParts, TextureImage, TexturePlaces, painting_of_parts, parts_of_painting, smoothed_in_memory,
+    textured_in_memory,
+};
 pub use reading::{Fix, Mended, NamedColumn, Notes, Textures};
 /// The nouns that this crate takes and returns.
 pub use splat_core;

@@ -2,8 +2,8 @@
 
 use crate::read_samples::image;
 use read::{
-    Fault, Loaded, Notes, Painting, ReadParams, Rgba, TextureImage, TexturePlaces, Textures, file,
-    mesh_columns_in_memory, smoothed_in_memory, textured_in_memory,
+    Fault, Loaded, Notes, Painting, PaintingParts, ReadParams, Rgba, TextureImage, TexturePlaces, Textures, file,
+    mesh_columns_in_memory, painting_of_parts, parts_of_painting, smoothed_in_memory, textured_in_memory,
 };
 use splat_core::glam::{DVec3, Vec2, Vec3};
 use splat_core::{Association, MemoryAccount, Mesh, MeshColumn, Relative};
@@ -71,6 +71,65 @@ fn a_texture_in_memory_paints_as_that_of_a_file() {
         assert_eq!(mesh, of_file);
         assert!(notes.remarks[0].starts_with("textures became colours of vertices"), "{notes:?}");
     }
+}
+
+#[test]
+fn a_painting_taken_apart_is_made_again_of_its_parts() {
+    let (_, texture) = of_file("textured-parts");
+    let params = ReadParams { textures: Textures::Kept, ..ReadParams::default() };
+    let tinted = Mesh { color: vec![[1.0, 0.5, 0.25]; 6], opacity: vec![0.5; 6], ..roof() };
+    let half = Rgba::Linear((0..64).map(|i| [1.0, 0.1, 0.0, if i % 8 < 4 { 1.0 } else { 0.0 }]).collect());
+    let images = [texels(&texture), TextureImage::File(texture), TextureImage::Texels { size: [8, 8], rgba: half }];
+    for image in images {
+        for mesh in [roof(), tinted.clone()] {
+            let (loaded, _) = textured_in_memory("roof", mesh, &of_corners(), image.clone(), &params).unwrap();
+            let Loaded::Painted(mesh, painting) = loaded else { panic!("no painting") };
+            let parts = parts_of_painting(&painting).expect("a painting of one texture");
+            assert_eq!(parts.places.len(), mesh.position.len());
+            assert_eq!(painting_of_parts("roof", parts, &params).unwrap(), painting);
+        }
+    }
+}
+
+/// Opacities of a texture whose opposite borders differ: places on a border that rounding leads beyond it would have those of the other side.
+#[test]
+fn triangles_are_divided_alike_whichever_corner_comes_first() {
+    let params = ReadParams { textures: Textures::Kept, ..ReadParams::default() };
+    let texel = |i: usize| [200, 0, 0, if i / 8 >= 4 && i % 8 >= 4 { 128 } else { 255 }];
+    let image = TextureImage::Texels { size: [8, 8], rgba: Rgba::Srgb((0..64).map(texel).collect()) };
+    let turned = |turn: usize| {
+        let rolled = |corners: [u32; 3]| [0, 1, 2].map(|k| corners[(k + turn) % 3]);
+        let places = [LOWER, UPPER, LOWER, UPPER].map(|places| [0, 1, 2].map(|k| places[(k + turn) % 3]));
+        let mesh = Mesh { triangles: TRIANGLES.map(rolled).to_vec(), ..roof() };
+        let places = TexturePlaces::Corners(places.to_vec());
+        let (loaded, _) = textured_in_memory("roof", mesh, &places, image.clone(), &params).unwrap();
+        let Loaded::Painted(mesh, _) = loaded else { panic!("no painting") };
+        let corners = |t: &[u32; 3]| {
+            let mut corners = t.map(|v| mesh.position[v as usize].to_array().map(|x| (x * 1e5).round() as i64));
+            corners.sort_unstable();
+            corners
+        };
+        let mut triangles: Vec<_> = mesh.triangles.iter().map(corners).collect();
+        triangles.sort_unstable();
+        triangles
+    };
+    let first = turned(0);
+    assert!(first.len() > 100, "{}", first.len());
+    assert!(first == turned(1) && first == turned(2), "{} {} {}", first.len(), turned(1).len(), turned(2).len());
+}
+
+#[test]
+fn parts_that_make_no_painting_are_refused() {
+    let parts = PaintingParts {
+        places: vec![[0.0; 2]; 3],
+        tint: vec![[1.0; 4]; 2],
+        size: [1, 1],
+        rgba: Rgba::Srgb(vec![[255; 4]]),
+        stated_triangles: 1,
+    };
+    let said = |parts| painting_of_parts("roof", parts, &ReadParams::default()).unwrap_err().to_string();
+    assert!(said(parts.clone()).contains("a tint of each vertex, 3"), "{}", said(parts.clone()));
+    assert!(said(PaintingParts { size: [2, 1], tint: Vec::new(), ..parts }).contains("2 texels"));
 }
 
 #[test]

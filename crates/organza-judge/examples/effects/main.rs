@@ -230,7 +230,25 @@ fn times(timed: &[Timed]) -> String {
         )
         .unwrap();
     }
-    text + "\n"
+    text + &map_bytes(timed) + "\n"
+}
+
+/// A sentence on the bytes of shadow maps.
+fn map_bytes(timed: &[Timed]) -> String {
+    let with_maps = timed.iter().filter(|one| one.map_bytes > 0 && one.predicted_map_bytes > 0);
+    let mut ratios: Vec<f64> = with_maps.map(|one| one.predicted_map_bytes as f64 / one.map_bytes as f64).collect();
+    ratios.sort_by(f64::total_cmp);
+    if ratios.is_empty() {
+        return String::new();
+    }
+    let near = ratios.iter().filter(|ratio| (1.0 / 1.2..=1.2).contains(*ratio)).count();
+    format!(
+        "\nBytes of all shadow maps of a picture, predicted over measured: {:.2} in the middle, {:.2} to {:.2}; within a fifth in {near} of {} pictures.\n",
+        ratios[ratios.len() / 2],
+        ratios[0],
+        ratios[ratios.len() - 1],
+        ratios.len()
+    )
 }
 
 /// The families, row by row.

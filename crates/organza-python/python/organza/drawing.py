@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from organza import _organza
 from organza._organza import InputError
+from organza.arrays import number
 from organza.checking import named
 from organza.picture import Picture
 from organza.progressing import Progress, heard
@@ -29,6 +30,9 @@ def render(
     fit: float | None = None,
     effects: dict[str, str] | None = None,
     transparent: bool = False,
+    budget_ms: int | None = None,
+    max_rmse: float | None = None,
+    max_flip: float | None = None,
     threads: int | None = None,
     max_memory: int | None = None,
     drop_invalid: bool = False,
@@ -50,6 +54,12 @@ def render(
         Effects that are switched, such as ``{"shadow.sun": "off"}``.
     transparent
         Keep what ``Picture.save(…, transparent=True)`` needs.
+    budget_ms
+        Milliseconds from files read to picture finished, 1 to 86,400,000: settings give way as far as the time requires, see :attr:`Picture.goal`. The key
+        ``render.budget_ms`` of a scene where it is None, as for the next two.
+    max_rmse, max_flip
+        Errors of the displayed picture against the scene's own settings, above 0 and at most 1: the root mean square, and the mean FLIP. The settings that cost
+        least within them are taken, or those that err least within ``budget_ms``.
     threads
         Threads that draw; as many as the machine has where it is None. Pictures are the same for any number.
     max_memory
@@ -71,7 +81,7 @@ def render(
     InputError
         Data or a scene that is wrong; the message names it, what was expected and found.
     LimitError
-        What would take more than ``max_memory``; nothing is drawn.
+        What would take more than ``max_memory``, or longer than ``budget_ms`` with every setting; nothing is drawn.
     FileNotFoundError, OSError
         Files that cannot be read.
     """
@@ -79,7 +89,9 @@ def render(
     with heard(progress) as told:
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, wished, how)
-        picture = Picture(_organza.render(scene._given(how, effects, size, transparent), how), scene.notes)
+        given = scene._given(how, effects, size, transparent)
+        given["changes"] = _goal({"budget_ms": budget_ms, "max_rmse": max_rmse, "max_flip": max_flip})
+        picture = Picture(_organza.render(given, how, True), scene.notes)
     for sentence in picture.warnings:
         # Of the caller, beyond the check of names.
         warnings.warn(sentence, stacklevel=3)
@@ -161,6 +173,11 @@ def _frame(
         how = how | {"progress": told}
         given = scene._given(how, effects, size, transparent, turntable=frames) | {"frame": frame}
         return Picture(_organza.render(given, how), scene.notes)
+
+
+def _goal(stated: Mapping[str, Any]) -> list[str]:
+    """Changes of a scene's keys that state a time or an error to keep to."""
+    return [f"render.{key}={number(key, value):.17g}" for key, value in stated.items() if value is not None]
 
 
 def _how(

@@ -81,6 +81,17 @@ class Picture:
         return cost
 
     @property
+    def goal(self) -> dict[str, Any] | None:
+        """How the picture keeps to a time or an error; None where none was asked for.
+
+        ``budget_ms``, ``max_rmse``, ``max_flip`` as they were asked for, ``expected_seconds``, ``taken_seconds``, ``expected_rmse``, ``expected_flip``,
+        ``errors_of`` (``"this scene"``, or ``"typical scenes"`` where small pictures of this one would take too much of the time), ``given_up`` (a list of ``key``, ``asked`` and ``taken``), and ``ladder``: the settings that were weighed, with ``antialias``, ``splat_share``,
+        ``sets``, ``seconds``, ``rmse`` and ``flip``.
+        """
+        goal: dict[str, Any] | None = self._facts.get("goal")
+        return goal
+
+    @property
     def warnings(self) -> list[str]:
         """What a user should know of the picture, one sentence each."""
         warnings: list[str] = self._facts["warnings"]
@@ -103,7 +114,7 @@ class Picture:
         transparent: bool = False,
         deep: bool = False,
         half: bool = False,
-        legend: bool = False,
+        legend: bool | str = False,
         force: bool = True,
     ) -> None:
         """Writes an OpenEXR file with all layers, or a PNG, WebP or JPEG file of what is displayed, by the ending of the name.
@@ -120,7 +131,8 @@ class Picture:
         half
             16 bits a channel in an OpenEXR file.
         legend
-            What colours stand for, over the right border of a PNG, WebP or JPEG file.
+            What colours stand for in a PNG, WebP or JPEG file: ``True`` or ``"over"`` over the right border of the picture, ``"beside"`` in a strip to the right
+            of it, which makes the file wider and covers nothing.
         force
             Whether a file of that name is replaced.
         """
@@ -128,13 +140,16 @@ class Picture:
         is_exr = ending == ".exr"
         # Of an ending that no file has, writing says so.
         has_bytes = ending in (".jpg", ".jpeg", ".webp")
-        without_effect = [("deep", deep and (is_exr or has_bytes)), ("legend", legend and is_exr), ("half", half and not is_exr)]
+        without_effect = [("deep", deep and (is_exr or has_bytes)), ("legend", bool(legend) and is_exr), ("half", half and not is_exr)]
         for name, is_asked in without_effect:
             if is_asked:
                 raise InputError(f"{name}: expected a file that can have it, found {os.fspath(path)}")
         if not force and os.path.exists(path):
             raise FileExistsError(f"{os.fspath(path)}: this file exists already; force=True replaces it")
-        for sentence in self._drawn.save(path, transparent, deep, half, legend, force):
+        if not isinstance(legend, (bool, str)):
+            raise InputError(f"legend: expected True, False, 'over' or 'beside', found {legend!r}")
+        place = legend if isinstance(legend, str) else "over" if legend else None
+        for sentence in self._drawn.save(path, transparent, deep, half, place, force):
             warnings.warn(sentence, stacklevel=2)
 
     def __getstate__(self) -> dict[str, Any]:

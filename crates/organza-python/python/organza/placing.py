@@ -84,7 +84,7 @@ class Camera:
         self._scene._document["camera"] = camera
 
     @named
-    def orbit(self, azimuth: float = 30.0, elevation: float = 20.0, fit: float = 1.0) -> None:
+    def orbit(self, azimuth: float = 30.0, elevation: float = 20.0, fit: float = 0.9) -> None:
         """Takes the camera around the middle of what the scene shows, at the distance from which all of it is seen.
 
         The place is found when the picture is drawn, so that data which is added later is seen too. The ground of :meth:`Scene.ground` does not count.
@@ -96,7 +96,7 @@ class Camera:
         elevation
             Degrees above the horizon, -90 to 90.
         fit
-            Share of the picture's width or height that is filled, above 0 and at most 1.
+            Share of the picture's width or height that is filled, above 0 and at most 1: with 1 the data touches the borders of the picture.
         """
         self(azimuth=azimuth, elevation=elevation, fit=fit)
 

@@ -178,6 +178,7 @@ class Scene:
         _check_finite("positions", positions)
         if isinstance(values, str):
             raise InputError(f"values: expected an array of numbers, found the text {values!r}; `color_by={values!r}` shows a column of `columns`")
+        _check_finite("values", values)
         check_keys(Scene.add_points, name or "points", keys)
         held = dict(columns or {})
         if radius is not None:
@@ -260,6 +261,7 @@ class Scene:
         _check_faces(faces)
         if isinstance(values, str):
             raise InputError(f"values: expected an array of numbers, found the text {values!r}; `color_by={values!r}` shows a column of `columns`")
+        _check_finite("values", values)
         _check_array("faces", faces)
         check_keys(Scene.add_mesh, name or "mesh", keys)
         corners = array_of(faces)
@@ -1111,18 +1113,20 @@ def _check_array(name: str, thing: Any) -> None:
 
 
 def _check_finite(name: str, thing: Any) -> None:
-    """Refuses places that are not finite, with the first such row."""
+    """Refuses places or numbers that are not finite, with the first such row."""
     array = array_of(thing)
-    if np.ndim(array) != 2 or not np.issubdtype(array.dtype, np.floating):
+    if np.ndim(array) not in (1, 2) or not np.issubdtype(array.dtype, np.floating):
         return
     # A sum is finite where all are, but for overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         if np.isfinite(array.sum()):
             return
-    wrong = ~np.isfinite(array).all(axis=1)
+    are_finite = np.isfinite(array)
+    wrong = ~(are_finite if array.ndim == 1 else are_finite.all(axis=1))
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError(f"{name}: expected finite coordinates, found {array[row].tolist()} in row {row}; leave such rows out")
+        what = "numbers" if array.ndim == 1 else "coordinates"
+        raise InputError(f"{name}: expected finite {what}, found {array[row].tolist()} in row {row}; leave such rows out")
 
 
 def _check_faces(faces: Any) -> None:

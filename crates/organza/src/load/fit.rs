@@ -6,7 +6,7 @@ use super::loading::Loading;
 use crate::Error;
 use crate::scene::{FoundCamera, Scene};
 use convert::{ConvertError, DiscSize, Outline, SurfelParams, raw_to_matter, raw_to_surfels};
-use field::visible_ends;
+use field::{surface_ends, visible_ends};
 use splat_core::glam::{DVec2, Vec3};
 use splat_core::{Camera, Cloud, DAabb, RawPoints, Similarity};
 use std::borrow::Cow;
@@ -95,7 +95,11 @@ fn outline<'i>(input: &'i Input<'i>) -> (Outline<'i>, Similarity) {
         Input::Volume(grid, transfer, params) => {
             Outline::Places(visible_ends(grid, transfer, params.splat.transform.scale, &params.clip))
         }
-        Input::Surface(_, bounds, ..) | Input::Density(_, bounds, _) => Outline::of_boxes([*bounds]),
+        Input::Surface(_, bounds, _, isosurface) => {
+            let ends = isosurface.as_ref().map_or_else(Vec::new, |it| surface_ends(&it.grid, f64::from(it.level)));
+            if ends.is_empty() { Outline::of_boxes([*bounds]) } else { Outline::Places(ends) }
+        }
+        Input::Density(_, bounds, _) => Outline::of_boxes([*bounds]),
         Input::Procedural(shape, ..) => {
             Outline::of_boxes(shape.ellipsoids.iter().map(|e| DAabb::around(e.center, e.radii)))
         }

@@ -85,6 +85,12 @@ impl Level {
         [self.columns, self.rows]
     }
 
+    /// Its texels, row by row from the top.
+    #[cfg(feature = "ply")]
+    pub(crate) fn rgba(&self) -> &Rgba {
+        &self.rgba
+    }
+
     /// Bytes of its texels.
     pub(crate) fn bytes(&self) -> u64 {
         self.rgba.bytes()

@@ -213,15 +213,22 @@ impl Texture {
         self.texels.mip_maps.first().size()
     }
 
+    /// Its texels in full size.
+    #[cfg(feature = "ply")]
+    pub(crate) fn rgba(&self) -> &Rgba {
+        self.texels.mip_maps.first().rgba()
+    }
+
     /// Linear colour and opacity at a place; (0, 0) is the upper left corner of the image, (1, 1) its lower right.
     ///
     /// Places up to the border have the colours within it: a vertex that lies on the border belongs to what it encloses, and
     /// not to the other side of the image, to which repetition would lead.
     pub(crate) fn at(&self, place: [f32; 2]) -> [f32; 4] {
-        self.nearest_or_between(place, self.wrap_of(&[place]))
+        self.at_wrapped(place, self.wrap_of(&[place]))
     }
 
-    fn nearest_or_between(&self, place: [f32; 2], wrap: [Wrap; 2]) -> [f32; 4] {
+    /// The same with the rules of [`Self::wrap_of`] for what the place is part of.
+    pub(crate) fn at_wrapped(&self, place: [f32; 2], wrap: [Wrap; 2]) -> [f32; 4] {
         if !self.is_nearest {
             return self.between(0, place, wrap);
         }
@@ -237,7 +244,7 @@ impl Texture {
         // A width that is no number is that of a texel.
         let level = libm::log2f(width.max(1.0)).min(last as f32);
         if level <= 0.0 {
-            return self.nearest_or_between(place, wrap);
+            return self.at_wrapped(place, wrap);
         }
         let low = level.floor();
         let share = level - low;

@@ -1,7 +1,8 @@
 //! Meshes in memory with a texture, which becomes what that of a file does.
 
+use super::mip_maps::Weight;
 use super::paint::corners::{BYTES_PER_CORNER, Corner, NONE, painted, smooth};
-use super::paint::{Alpha, Paint};
+use super::paint::{Alpha, Paint, Painting};
 use super::places::first_at_place;
 use super::ply::texture::Wedges;
 use super::rgba::Rgba;
@@ -39,6 +40,61 @@ pub enum TexturePlaces {
 
 /// The only paint of such a mesh: the texture, whose opacities are those of the surface.
 const PAINT: Paint = Paint { factor: [1.0; 4], texture: Some(0), alpha: Alpha::Blended };
+
+/// The painting of [`textured_in_memory`] in parts, from which [`painting_of_parts`] makes it again with the same bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaintingParts {
+    /// Place in the texture, one a vertex: (0, 0) is the *upper* left corner of the image, (1, 1) its lower right.
+    pub places: Vec<[f32; 2]>,
+    /// Linear colour and opacity that the texture is multiplied by, one a vertex; empty for white.
+    pub tint: Vec<[f32; 4]>,
+    /// Columns and rows of the image.
+    pub size: [u32; 2],
+    /// Texels of the image in its full size.
+    pub rgba: Rgba,
+    /// Triangles of the mesh before any was divided along opacities.
+    pub stated_triangles: u64,
+}
+
+/// Takes a painting of [`textured_in_memory`] apart; `None` for a painting of a file, which may have several materials.
+pub fn parts_of_painting(painting: &Painting) -> Option<PaintingParts> {
+    let [texture] = painting.textures.as_slice() else { return None };
+    if painting.paints != [PAINT] {
+        return None;
+    }
+    Some(PaintingParts {
+        places: painting.place.clone(),
+        tint: painting.tint.clone(),
+        size: texture.size(),
+        rgba: texture.rgba().clone(),
+        stated_triangles: painting.stated_triangles,
+    })
+}
+
+/// Makes a painting of the parts that [`parts_of_painting`] gave. `name` serves messages.
+///
+/// # Errors
+/// [`ReadError`] for texels that [`textured_in_memory`] refuses, for places and tints of different counts, and for what takes more memory than `params`
+/// allow.
+pub fn painting_of_parts(name: &str, parts: PaintingParts, params: &ReadParams) -> Result<Painting, ReadError> {
+    let params = &ReadParams { memory: params.memory.part(), ..params.clone() };
+    let reading = Reading::new(params, None);
+    let PaintingParts { places, tint, size, rgba, stated_triangles } = parts;
+    if !tint.is_empty() && tint.len() != places.len() {
+        let expected = format!("a tint of each vertex, {}", places.len());
+        return Err(ReadError::input(Place::File, expected, tint.len().to_string(), "").in_file(name));
+    }
+    let texture = Texture::of_texels(size, rgba, &reading).map_err(|e| e.in_file(name))?;
+    let texture = texture.with_mip_maps(Weight::Opacity, &mut Vec::new(), &reading).map_err(|e| e.in_file(name))?;
+    Ok(Painting {
+        paints: vec![PAINT],
+        textures: Texture::released(&[texture]),
+        paint_of: vec![0; places.len()],
+        tint,
+        place: places,
+        stated_triangles,
+    })
+}
 
 /// Paints a mesh in memory with a texture, as [`ReadParams::textures`] has it for a file: the result is a [`Loaded::Mesh`] or [`Loaded::Painted`]. Colours and opacities of its vertices are multiplied by those of
 /// the texture. Normals that are missing are smooth across vertices at one place. `name` serves messages.

@@ -153,7 +153,9 @@ fn lengths(corners: [Vec2; 3], texture: &Texture) -> [f32; 3] {
 /// Whether a colour of the texture within the triangle, or an opacity that counts, is not what lies between those of its corners. With `alpha_alone`
 /// colours are not looked at.
 fn deviates(corners: [Vec2; 3], texture: &Texture, longest: f32, alpha: Alpha, alpha_alone: bool) -> bool {
-    let at = |place: Vec2| texture.at(place.to_array());
+    // Rounding leads places on the border beyond it, where repetition would have the other side of the image.
+    let wrap = texture.wrap_of(&corners.map(|corner| corner.to_array()));
+    let at = |place: Vec2| texture.at_wrapped(place.to_array(), wrap);
     let [a, b, c] = corners.map(at);
     // A sample a texel: `longest` is at most COARSE.
     let n = longest.ceil() as usize;
