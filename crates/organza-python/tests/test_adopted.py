@@ -49,6 +49,23 @@ def test_xarray_by_the_names_of_its_dimensions():
         og.Scene().add(uneven)
 
 
+def test_xarray_dimensions_of_the_earth_and_those_that_are_no_axes():
+    xr = pytest.importorskip("xarray")
+    values = np.arange(210.0).reshape(5, 6, 7)
+    look = {"transfer": og.transfer(clim=(0, 210))}
+    drawn = {}
+    for dims, turned in [(("lon", "lat", "depth"), values), (("Depth", "latitude", "longitude"), values.transpose()), (("a", "b", "c"), values.transpose())]:
+        scene = og.Scene()
+        scene.add(xr.DataArray(turned, dims=dims), **look)
+        drawn[dims] = og.render(scene, size=SMALL).rgb
+    first, *others = drawn.values()
+    assert all(np.array_equal(first, other) for other in others)
+    with pytest.raises(og.InputError, match=r"found \('x', 'y', 'time'\); `rename`"):
+        og.Scene().add_volume(xr.DataArray(values, dims=("x", "y", "time")), **look)
+    with pytest.raises(og.InputError, match=r"such as dataset\[NAME\], found those of \['heat'\]"):
+        og.Scene().add(xr.Dataset({"heat": (("z", "y", "x"), values)}))
+
+
 def test_nibabel_images_stand_up():
     nib = pytest.importorskip("nibabel")
     values = np.random.default_rng(0).random((6, 7, 8)).astype(np.float32)

@@ -241,16 +241,21 @@ fn present(numbers: &[f64]) -> Vec<f64> {
     of_chunks.reduce(Vec::new, |first, second| least([first, second].concat()))
 }
 
-/// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count.
+/// The numbers below which the first and all but the last hundredth of a column lie; gaps do not count. Where both are one number, the least and the
+/// greatest of all: a few flags among many zeros are what such a column is shown for.
 fn spread(numbers: &[f64], by: &ColorBy, map: ColorMap) -> [f64; 2] {
     let mut shown: Vec<f64> = numbers.iter().copied().filter(|n| by.colors.shows(*n)).collect();
     if shown.is_empty() {
         return [0.0; 2];
     }
-    let [low, high] = SHARES.map(|share| {
+    let mut ends = SHARES.map(|share| {
         let rank = ((shown.len() - 1) as f64 * share).round() as usize;
         *shown.select_nth_unstable_by(rank, f64::total_cmp).1
     });
+    if ends[0] == ends[1] {
+        ends = shown.iter().fold(ends, |[low, high], number| [low.min(*number), high.max(*number)]);
+    }
+    let [low, high] = ends;
     let end = high.max(-low);
     if map.is_diverging() && low < 0.0 && high > 0.0 { [-end, end] } else { [low, high] }
 }
@@ -271,6 +276,18 @@ mod tests {
     fn points(values: Vec<f64>) -> RawPoints {
         let columns = vec![Column { name: "it".into(), values }];
         RawPoints { position: vec![Vec3::ZERO; columns[0].values.len()], columns, ..RawPoints::default() }
+    }
+
+    #[test]
+    fn a_map_spans_all_numbers_where_its_percentiles_are_one() {
+        let by = ColorBy { column: "it".into(), colors: PointColors::Classes };
+        let ends = |values: &[f64]| spread(values, &by, ColorMap::named("viridis").unwrap());
+        let flags: Vec<f64> = (0..500).map(|i| if i % 200 == 7 { 3.0 } else { 0.0 }).collect();
+        assert_eq!(ends(&flags), [0.0, 3.0]);
+        assert_eq!(ends(&[2.0; 9]), [2.0; 2]);
+        // Strays do not count where the others differ.
+        let strays: Vec<f64> = (0..1000).map(|i| if i == 500 { 1e9 } else { f64::from(i) }).collect();
+        assert_eq!(ends(&strays), [10.0, 990.0]);
     }
 
     fn colored_column(values: Vec<f64>, colors: PointColors) -> Colored {

@@ -291,14 +291,35 @@ def _simpleitk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     return "volume", "image", arguments
 
 
+# Names of the dimensions of arrays, in lower case.
+_NAMES_OF_AXES = {
+    "x": ("x", "lon", "longitude", "easting"),
+    "y": ("y", "lat", "latitude", "northing"),
+    "z": ("z", "depth", "height", "altitude", "elevation", "level"),
+}
+
+
+def _in_order(thing: Any) -> Any:
+    """An array of xarray with its dimensions in the order z, y, x, by their names; as it is where none of them is known."""
+    found = {axis: [dim for dim in thing.dims if str(dim).lower() in names] for axis, names in _NAMES_OF_AXES.items()}
+    order = [dims[0] for axis in "zyx" if len(dims := found[axis]) == 1]
+    if len(order) == 3:
+        return thing.transpose(*order)
+    if any(found.values()):
+        expected = "the dimensions x, y and z (or longitude, latitude, depth …), or none that is called so, in the order z, y, x"
+        raise InputError(f"the array: expected {expected}, found {tuple(thing.dims)}; `rename` gives others, `isel` takes a part")
+    return thing
+
+
 def _xarray(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
-    """An array of xarray: by its dimensions x, y and z where they are called so, else in the order that it has."""
+    """An array of xarray: by the names of its dimensions where they are known, else in the order that it has."""
     if not hasattr(thing, "dims") or not hasattr(thing, "coords") or not hasattr(thing, "values"):
         return None
+    if hasattr(thing, "data_vars"):
+        raise InputError(f"the data set: expected one of its arrays, such as dataset[NAME], found those of {sorted(map(str, thing.data_vars))}")
     if len(thing.dims) != 3:
         raise InputError(f"the array: expected three dimensions, found {tuple(thing.dims)}; take a part by `isel`")
-    if {"x", "y", "z"} <= set(thing.dims):
-        thing = thing.transpose("z", "y", "x")
+    thing = _in_order(thing)
     spacing, origin = [], []
     for dim in reversed(thing.dims):
         places = np.asarray(thing.coords[dim].values, dtype=float) if dim in thing.coords else np.arange(float(thing.sizes[dim]))

@@ -39,6 +39,12 @@ def array_of(thing: Any) -> Any:
 def colors_of(thing: Any, name: str = "colors") -> Any:
     """Colours as the extension takes them: linear numbers with a point, or whole ones of sRGB of one byte or two."""
     array = array_of(thing)
+    if array is not None and np.issubdtype(array.dtype, np.floating) and array.size:
+        # A light may be brighter than white, hardly most of a picture.
+        bright = np.count_nonzero(array > 1.0)
+        if 2 * bright > array.size:
+            found = f"{array.dtype} up to {float(np.nanmax(array)):g}, of which {bright} of {array.size} lie above 1"
+            raise InputError(f"{name}: expected linear numbers, 1 for white, found {found}; bytes of sRGB are `.astype(np.uint8)`")
     if array is None or not np.issubdtype(array.dtype, np.integer) or array.dtype in (np.uint8, np.uint16) or not array.size:
         return array
     low, high = (int(end) for end in (array.min(), array.max()))
@@ -135,9 +141,13 @@ def radii_of(radius: Any, count: int) -> np.ndarray:
 def number(name: str, value: Any) -> float:
     """A finite number."""
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value):
+    try:
+        found = float(value) if is_number else math.nan
+    except OverflowError:
+        found = math.inf
+    if not math.isfinite(found):
         raise InputError(f"{name}: expected a finite number, found {value!r}")
-    return float(value)
+    return found
 
 
 def place_of(name: str, value: Any) -> list[float]:

@@ -16,6 +16,9 @@ from organza.picture import Picture
 from organza.progressing import Progress, heard
 from organza.scene import Scene, scene_of
 
+# More than any picture, machine or film has, and exact as a number with a point.
+_MOST = 2**53
+
 
 @named
 def render(
@@ -197,7 +200,9 @@ def _whole(name: str, value: Any) -> int | None:
     if value is None:
         return None
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not is_number or not np.isfinite(value) or value != int(value) or value < 1:
+    if is_number and value > _MOST:
+        raise InputError(f"{name}: expected at most {_MOST}, found {value!r}")
+    if not is_number or not value >= 1 or value != int(value):
         raise InputError(f"{name}: expected a whole number from 1 on, found {value!r}")
     return int(value)
 
@@ -223,8 +228,8 @@ def _wished(
         "color_by": color_by,
         "up": up,
         "ground": ground,
-        "azimuth": azimuth,
-        "elevation": elevation,
-        "fit": fit,
+        "azimuth": None if azimuth is None else number("azimuth", azimuth),
+        "elevation": None if elevation is None else number("elevation", elevation),
+        "fit": None if fit is None else number("fit", fit),
         "turntable": None,
     }

@@ -94,10 +94,12 @@ def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any) -> 
 
 
 def percentiles(values: Any) -> tuple[float, float]:
-    """The 1st and 99th percentile of the finite values, growing in any case."""
+    """The 1st and 99th percentile of the finite values; where both are one, the least and greatest; growing in any case."""
     numbers = np.asarray(array_of(values), dtype=float)
     finite = numbers[np.isfinite(numbers)]
     if not finite.size:
         raise InputError("values: expected a voxel with a value, found none")
     low, high = (float(end) for end in np.percentile(finite, [1.0, 99.0]))
+    if low == high:
+        low, high = float(finite.min()), float(finite.max())
     return (low, high) if low < high else (low, low + max(abs(low), 1.0))
