@@ -1130,8 +1130,11 @@ def _check_finite(name: str, thing: Any) -> None:
 
 
 def _check_faces(faces: Any) -> None:
-    """Refuses the list of counts and indices that VTK has."""
+    """Refuses counts and indices as VTK has them, in one row or in one for each face."""
     flat = array_of(faces)
+    # Five quads that all begin with vertex 3 are hardly meant.
+    if np.ndim(flat) == 2 and flat.shape[1] == 4 and len(flat) >= 5 and (flat[:, 0] == 3).all():
+        raise InputError("faces: expected the corners of each face, found 3 before those of each, as VTK counts them; give `faces[:, 1:]`")
     if np.ndim(flat) != 1 or not len(flat):
         return
     sides = next((sides for sides in (3, 4) if len(flat) % (sides + 1) == 0 and (flat[:: sides + 1] == sides).all()), None)
