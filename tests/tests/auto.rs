@@ -274,6 +274,28 @@ fn slabs_carry_the_light_of_a_lamp_of_many_points() {
 }
 
 #[test]
+fn volumes_too_unlike_for_common_slabs_are_drawn_by_splats() {
+    let ball = |name: &str, radius: f64, spacing: f64| {
+        format!(
+            "[[object]]\nname = '{name}'\ndensity = {{ expression = 'max(0, {radius:?} - sqrt(x^2 + y^2 + z^2))', \
+             box = [[{0:?}, {0:?}, {0:?}], [{radius:?}, {radius:?}, {radius:?}]], spacing = {spacing:?}, extinction = {1:?} }}\n",
+            -radius,
+            4.0 / (radius * radius)
+        )
+    };
+    let lamp =
+        "[[light]]\nkind = 'sphere'\nposition = [0.5, 4, 1]\nradius = 0.5\nintensity = [20, 20, 20]\nsamples = 24\n";
+    let drawn = |fine: f64| {
+        let text = parallel_view(4.0, 16) + &ball("large", 1.5, 0.05) + &ball("small", 8.0 * fine, fine) + lamp;
+        Place::new(&text).expect(0, &["render", "s.toml", "-o", "s.exr", "--force"], "");
+        drawn_by(&text, &["large", "small"])
+    };
+    // A kernel of the large one would lie in a thousand slabs of the small one's step.
+    assert_eq!(drawn(5e-5), ["points", "points"]);
+    assert_eq!(drawn(0.05), ["sheets", "sheets"]);
+}
+
+#[test]
 fn bumps_are_drawn_by_the_technique_that_shows_them() {
     let text = parallel_view(4.0, 32)
         + "[material.clay]\nbump = { height = 0.02, size = 0.25 }\n[[light]]\nkind = 'directional'\ndirection = [0, -1, -1]\nirradiance = [3, 3, 3]\n\

@@ -55,6 +55,8 @@ struct Kept {
     /// Whether the errors are those of this scene.
     is_probed: bool,
     ladder: Vec<Expected>,
+    /// The same for programs.
+    document: Value,
 }
 
 impl Kept {
@@ -108,26 +110,12 @@ impl Kept {
     }
 
     fn json(&self) -> Value {
-        let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
-        let rung = |rung: &Expected| {
-            json!({
-                "antialias": rung.antialias, "splat_share": rung.splat_share, "sets": rung.sets,
-                "seconds": rung.time.as_secs_f64(), "rmse": rung.error.rmse, "flip": rung.error.flip,
-            })
-        };
-        json!({
-            "seconds": self.goal.budget_ms.map(|ms| Duration::from_millis(ms).as_secs_f64()),
-            "max_rmse": self.goal.max_rmse,
-            "max_flip": self.goal.max_flip,
-            "expected_seconds": self.expected.as_secs_f64(),
-            "taken_seconds": self.taken.as_secs_f64(),
-            "expected_rmse": self.error.rmse,
-            "expected_flip": self.error.flip,
-            "errors_of": if self.is_probed { "this scene" } else { "typical scenes" },
-            "given_up": self.given_up.iter().map(setting).collect::<Value>(),
-            "same_again": self.options().collect::<Value>(),
-            "ladder": self.ladder.iter().map(rung).collect::<Value>(),
-        })
+        let mut document = self.document.clone();
+        document["seconds"] = json!(self.goal.budget_ms.map(|ms| Duration::from_millis(ms).as_secs_f64()));
+        document["max_rmse"] = json!(self.goal.max_rmse);
+        document["max_flip"] = json!(self.goal.max_flip);
+        document["same_again"] = self.options().collect();
+        document
     }
 }
 
@@ -313,9 +301,11 @@ impl Job<'_> {
         progress.enter();
         let (render, kept) = if self.goal.is_any() {
             let within = drawing.render_within(self.scene, &self.goal, &options, progress)?;
+            let document = documents::within_goal_json(&within);
             let WithinGoal { render, given_up, expected, taken, error, is_probed, ladder } = within;
             let without_goal = self.without_goal.clone();
-            (render, Some(Kept { goal: self.goal, given_up, without_goal, expected, taken, error, is_probed, ladder }))
+            let goal = self.goal;
+            (render, Some(Kept { goal, given_up, without_goal, expected, taken, error, is_probed, ladder, document }))
         } else {
             (drawing.render(self.scene, &options, progress)?, None)
         };

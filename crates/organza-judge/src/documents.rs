@@ -4,7 +4,7 @@ use crate::effects::{EffectChange, FixedEffect, Measured};
 use organza::cost::{CountedPass, EffectWork, Prediction};
 use organza::plan::{Estimate, Plan, PlannedObject, PlannedSetting};
 use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
-use organza::{CostRecord, ShadowTable, SplatCount};
+use organza::{CostRecord, Expected, GivenUp, ShadowTable, SplatCount, WithinGoal};
 use serde_json::{Value, json};
 
 /// The cost record as JSON, a list of stages.
@@ -16,6 +16,26 @@ pub fn cost_json(cost: &CostRecord) -> Value {
         })
     };
     cost.stages.iter().map(stage).collect()
+}
+
+/// How a picture keeps to a time or an error: expected and reached, the settings that gave way, and the ladder of those that were weighed.
+pub fn within_goal_json(within: &WithinGoal) -> Value {
+    let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
+    let rung = |rung: &Expected| {
+        json!({
+            "antialias": rung.antialias, "splat_share": rung.splat_share, "sets": rung.sets,
+            "seconds": rung.time.as_secs_f64(), "rmse": rung.error.rmse, "flip": rung.error.flip,
+        })
+    };
+    json!({
+        "expected_seconds": within.expected.as_secs_f64(),
+        "taken_seconds": within.taken.as_secs_f64(),
+        "expected_rmse": within.error.rmse,
+        "expected_flip": within.error.flip,
+        "errors_of": if within.is_probed { "this scene" } else { "typical scenes" },
+        "given_up": within.given_up.iter().map(setting).collect::<Value>(),
+        "ladder": within.ladder.iter().map(rung).collect::<Value>(),
+    })
 }
 
 /// The camera's placement, and whether the fit chose it.

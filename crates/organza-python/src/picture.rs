@@ -7,7 +7,7 @@ use convert::ColorScale;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use organza::output::{self, Format, LegendPlace, Metadata, Params, Target};
 use organza::scene::{Goal, LAYER_NAMES, Scene};
-use organza::{Error, Expected, GivenUp, Render, WithinGoal};
+use organza::{Error, GivenUp, Render, WithinGoal};
 use organza_judge::documents;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -38,28 +38,12 @@ impl Picture {
 
     /// A picture that keeps to a goal. Its text has the settings that were taken, so that it draws the same picture.
     pub(crate) fn within(scene: &Scene, text: &str, within: WithinGoal) -> Self {
-        let WithinGoal { render, given_up, expected, taken, error, is_probed, ladder } = within;
-        let setting = |setting: &GivenUp| json!({ "key": setting.key, "asked": setting.asked, "taken": setting.taken });
-        let rung = |rung: &Expected| {
-            json!({
-                "antialias": rung.antialias, "splat_share": rung.splat_share, "sets": rung.sets,
-                "seconds": rung.time.as_secs_f64(), "rmse": rung.error.rmse, "flip": rung.error.flip,
-            })
-        };
+        let mut goal = documents::within_goal_json(&within);
         let Goal { budget_ms, max_rmse, max_flip } = scene.render.goal;
-        let goal = json!({
-            "budget_ms": budget_ms,
-            "max_rmse": max_rmse,
-            "max_flip": max_flip,
-            "expected_seconds": expected.as_secs_f64(),
-            "taken_seconds": taken.as_secs_f64(),
-            "expected_rmse": error.rmse,
-            "expected_flip": error.flip,
-            "errors_of": if is_probed { "this scene" } else { "typical scenes" },
-            "given_up": given_up.iter().map(setting).collect::<Value>(),
-            "ladder": ladder.iter().map(rung).collect::<Value>(),
-        });
-        Self::with_goal(scene, with_taken(text, &given_up), render, goal)
+        goal["budget_ms"] = json!(budget_ms);
+        goal["max_rmse"] = json!(max_rmse);
+        goal["max_flip"] = json!(max_flip);
+        Self::with_goal(scene, with_taken(text, &within.given_up), within.render, goal)
     }
 
     fn with_goal(scene: &Scene, text: String, render: Render, goal: Value) -> Self {

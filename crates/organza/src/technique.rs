@@ -24,7 +24,7 @@ use crate::pass;
 use crate::plan::{Estimate, Plan, PlannedSetting};
 use crate::scene::{LightPoint, RenderSettings, Scene, Technique};
 use crate::stage;
-use crate::statistics::{MediumFacts, ObjectStatistics};
+use crate::statistics::{MediumFacts, ObjectStatistics, SourceFacts};
 use crate::{CostRecord, Error, Layers, Progress, RenderOptions};
 pub(crate) use estimates::{Asked, estimates};
 pub(crate) use particles::{Checkpoint, Kept};
@@ -106,9 +106,9 @@ pub(crate) struct Row {
     pub(crate) carries: fn(&RenderSettings) -> Option<CarriesLight>,
     /// How a scene asks it for light that media scatter again and again; `None` where it has none.
     pub(crate) scatters_by: Option<&'static str>,
-    /// Settings with each of which it carries light through media, if it draws alone all that is translucent; none where it cannot or a scene states
-    /// otherwise. `auto` may take one of them with the technique.
-    pub(crate) alone: fn(&Scene) -> Vec<RenderSettings>,
+    /// Settings with each of which it carries light through media, if it draws alone all that is translucent; none where it cannot, which facts of the media
+    /// tell, or a scene states otherwise. `auto` may take one of them with the technique.
+    pub(crate) alone: fn(&Scene, &SourceFacts) -> Vec<RenderSettings>,
     /// Settings of its own that have a part in a planned picture and that a scene may leave to the plan.
     pub(crate) settings: fn(&Scene, &Loaded, &Plan) -> Vec<PlannedSetting>,
     /// Adds effects and passes of its own to the plan of a scene that it draws, and takes out what it does not need.
@@ -340,7 +340,7 @@ const POINTS: Row = Row {
     bytes: |_, _, _, _| 0,
     carries: |_| None,
     scatters_by: None,
-    alone: |_| Vec::new(),
+    alone: |_, _| Vec::new(),
     settings: points::settings,
     plans: |_, _, _| {},
     repeats: |_| String::new(),

@@ -78,7 +78,7 @@ mod sweep;
 
 pub use crate::shared::reason::{LEAST_COSINE, MOST_DEPTH, Reason};
 pub use counts::HalfCounts;
-pub use fold::{Drawn, balance, fold, slab_width};
+pub use fold::{Drawn, balance, fold, has_slabs, slab_width};
 pub use input::{Extended, HalfInput, HalfSplats, MOST_SAMPLES};
 pub use memory::{bytes, polygon_bytes};
 pub use params::{HalfParams, Scattering};

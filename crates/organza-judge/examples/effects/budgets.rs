@@ -3,6 +3,7 @@
 use super::{fill_page, name, sized};
 use organza::scene::{Goal, Scene};
 use organza::{Error, Files, Layers, Progress, RenderOptions, render_within};
+use reference::metrics::{Image, compare};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -115,20 +116,9 @@ fn within(scene: &Scene, whole: &Layers, limit: Limit, asked: f64) -> Kept {
 
 /// Root mean square of the differences of two pictures as they are displayed, without exposure.
 fn displayed_rmse(first: &Layers, second: &Layers) -> f64 {
-    let displayed = |layers: &Layers| {
-        let beauty = layers.rgb("beauty").unwrap();
-        beauty.iter().flatten().map(|radiance| encoded(f64::from(*radiance))).collect::<Vec<f64>>()
-    };
-    let first = displayed(first);
-    let second = displayed(second);
-    let sum: f64 = first.iter().zip(&second).map(|(a, b)| (a - b) * (a - b)).sum();
-    (sum / first.len() as f64).sqrt()
-}
-
-/// sRGB of a radiance, 0 to 1.
-fn encoded(radiance: f64) -> f64 {
-    let shown = radiance.clamp(0.0, 1.0);
-    if shown <= 0.003_130_8 { 12.92 * shown } else { 1.055 * shown.powf(1.0 / 2.4) - 0.055 }
+    let displayed =
+        |layers: &Layers| Image::from_layer(layers.size, layers.rgb("beauty").unwrap()).unwrap().display(0.0);
+    compare(&displayed(first), &displayed(second)).unwrap().rmse
 }
 
 fn csv(kept: &[Kept]) -> String {

@@ -15,6 +15,8 @@ from organza.transfers import Transfer
 
 # The largest number of a byte.
 _MOST_OF_A_BYTE = 255
+# Times white that a colour may be before most such colours are taken for bytes.
+_BRIGHTEST = 16
 _HEX_COLOR = re.compile("#[0-9a-fA-F]{6}")
 
 
@@ -40,9 +42,9 @@ def colors_of(thing: Any, name: str = "colors") -> Any:
     """Colours as the extension takes them: linear numbers with a point, or whole ones of sRGB of one byte or two."""
     array = array_of(thing)
     if array is not None and np.issubdtype(array.dtype, np.floating) and array.size:
-        # A light may be brighter than white, hardly most of a picture.
+        # Radiance may lie above 1, a few times white; most numbers of a picture of bytes do, up to 255.
         bright = np.count_nonzero(array > 1.0)
-        if 2 * bright > array.size:
+        if 2 * bright > array.size and _BRIGHTEST < np.nanmax(array) <= _MOST_OF_A_BYTE:
             found = f"{array.dtype} up to {float(np.nanmax(array)):g}, of which {bright} of {array.size} lie above 1"
             raise InputError(f"{name}: expected linear numbers, 1 for white, found {found}; bytes of sRGB are `.astype(np.uint8)`")
     if array is None or not np.issubdtype(array.dtype, np.integer) or array.dtype in (np.uint8, np.uint16) or not array.size:

@@ -93,7 +93,7 @@ fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Wa
         });
         way(scene, facts, by.collect(), scene.render.clone())
     });
-    let of_row = |row: &'static Row| (row.alone)(scene).into_iter().map(move |settings| (row, settings));
+    let of_row = |row: &'static Row| (row.alone)(scene, facts).into_iter().map(move |settings| (row, settings));
     let alone = TABLE.iter().flat_map(of_row).filter_map(|(row, settings)| {
         let draws = |(rank, object): (usize, &SceneObject)| match technique_of(object, scene) {
             Technique::Auto => true,

@@ -12,69 +12,64 @@ use splat_core::{DAabb, RawPoints};
 /// Points that are looked at, of more every nth.
 const FEW: usize = 1 << 16;
 
-/// A world-space box around what may be translucent of each object, by its rank in the scene, empty where nothing is; `None` for an invisible object, and where
+/// A world-space box around what may be translucent of each object, by its rank in the scene: empty for an opaque object, `None` for an invisible one and where
 /// no box is known.
 ///
 /// # Errors
-/// Those of reading their files.
+/// [`Error::Input`] and [`Error::Io`] for a file that cannot be read.
 pub(crate) fn boxes(scene: &Scene, context: Context<'_>) -> Result<Vec<Option<DAabb>>, Error> {
     let loading = Loading { scene, context };
     let mut boxes = vec![None; scene.objects.len()];
     for (rank, object) in loading.visible() {
-        let places = places(object, &loading.context(rank, 0, 0)).map_err(|e| loading.named(object, e))?;
-        let world =
-            |places: Vec<DVec3>| DAabb::of_points(places.into_iter().map(|place| object.transform.apply(place)));
-        boxes[rank] = places.map(world);
+        boxes[rank] = world_box(object, &loading.context(rank, 0, 0)).map_err(|e| loading.named(object, e))?;
     }
     Ok(boxes)
 }
 
-/// Places around what may be translucent of an object, before its transform: none for an opaque one, `None` where no place is known.
-fn places(object: &SceneObject, context: &ObjectContext<'_>) -> Result<Option<Vec<DVec3>>, Error> {
-    let corners = |bounds: DAabb| bounds.corners().to_vec();
+/// The box of one object.
+fn world_box(object: &SceneObject, context: &ObjectContext<'_>) -> Result<Option<DAabb>, Error> {
+    let around = |places: &mut dyn Iterator<Item = DVec3>| {
+        Some(DAabb::of_points(places.map(|place| object.transform.apply(place))))
+    };
+    let around_box = |bounds: DAabb| around(&mut bounds.corners().into_iter());
     Ok(match &object.source {
         Source::Mesh(path) => match context.read(path)? {
             SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
-                Some(mesh.position.iter().map(|place| place.as_dvec3()).collect())
+                around(&mut mesh.position.iter().map(|place| place.as_dvec3()))
             }
             _ => None,
         },
         Source::Points(path) | Source::Matter(MatterSource { path, .. }) => match context.read(path)? {
-            SourceData::Points(points) => places_of_points(&points, object, context.scene),
+            // Gaussians reach far beyond their centres.
+            SourceData::Points(points) if points.gaussians.is_empty() => {
+                let is_opaque = !object.source.is_medium() && are_opaque(&points, object, context.scene);
+                let step = points.len().div_ceil(FEW).max(1);
+                let places = points.position.iter().step_by(step).map(|place| points.origin + place.as_dvec3());
+                if is_opaque { Some(DAabb::EMPTY) } else { around(&mut { places }) }
+            }
             _ => None,
         },
         Source::Volume(VolumeSource { path, frame, transfer }) => match context.read_frame(path, *frame)? {
-            SourceData::Grid(grid) => Some(visible_ends(&grid, transfer, object.transform.scale, &object.clip)),
+            SourceData::Grid(grid) => {
+                around(&mut visible_ends(&grid, transfer, object.transform.scale, &object.clip).into_iter())
+            }
             _ => None,
         },
-        Source::Implicit(implicit) => Some(corners(implicit.bounds)),
-        Source::Density(density) => Some(corners(density.bounds)),
+        Source::Implicit(implicit) => around_box(implicit.bounds),
+        Source::Density(density) => around_box(density.bounds),
         Source::Cloud(cloud) => {
             let ellipsoids = cloud.shape().ellipsoids.into_iter();
-            Some(ellipsoids.flat_map(|e| DAabb::around(e.center, e.radii).corners()).collect())
+            around(&mut ellipsoids.flat_map(|e| DAabb::around(e.center, e.radii).corners()))
         }
-        Source::Medium(medium) => Some(corners(medium.body.bounds())),
+        Source::Medium(medium) => around_box(medium.body.bounds()),
         Source::Rectangle(rectangle) => {
             let half = rectangle.u.abs() + rectangle.v.abs();
-            Some(corners(DAabb::new(rectangle.center - half, rectangle.center + half)))
+            around_box(DAabb::new(rectangle.center - half, rectangle.center + half))
         }
         Source::Extract(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Combined(_) | Source::Slice(_) => {
             None
         }
     })
-}
-
-/// Every nth point; none of opaque ones.
-fn places_of_points(points: &RawPoints, object: &SceneObject, scene: &Scene) -> Option<Vec<DVec3>> {
-    if !points.gaussians.is_empty() {
-        // Gaussians reach far beyond their centres.
-        return None;
-    }
-    if !object.source.is_medium() && are_opaque(points, object, scene) {
-        return Some(Vec::new());
-    }
-    let step = points.len().div_ceil(FEW).max(1);
-    Some(points.position.iter().step_by(step).map(|place| points.origin + place.as_dvec3()).collect())
 }
 
 /// Whether neither the points nor what the scene states about them leaves any light through.

@@ -33,12 +33,12 @@ pub(crate) struct Asked<'a> {
 }
 
 impl<'a> Asked<'a> {
-    /// What is known of the object where it is a medium in view.
+    /// Facts of the medium that the object is; `None` for another object, and for a medium out of view.
     pub(crate) fn medium(&self) -> Option<&'a MediumFacts> {
         self.facts.medium(self.rank)
     }
 
-    /// What is known of the object where it is a mesh.
+    /// Facts of the mesh that the object is; `None` for another object.
     pub(crate) fn mesh(&self) -> Option<&'a MeshFacts> {
         self.facts.mesh(self.rank)
     }

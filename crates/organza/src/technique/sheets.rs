@@ -17,10 +17,10 @@ use crate::load::own::{Body, Own};
 use crate::pass;
 use crate::plan::{Effect, Plan, PlannedSetting};
 use crate::scene::{self, LightPoint, Scene, Technique};
-use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics};
+use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics, SourceFacts};
 use crate::technique::{Asked, Fold, OwnWork, Session, points};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
-use sheet_light::half::{HalfParams, pane_bytes, polygon_bytes};
+use sheet_light::half::{HalfParams, has_slabs, pane_bytes, polygon_bytes};
 use sheet_light::{
     Aligned, Classify, GatherKernel, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted,
     Splats, Volume, prepare,
@@ -65,10 +65,17 @@ pub(crate) fn counts(_: &Scene, translucent: &Translucent) -> Vec<Count> {
     ]
 }
 
-/// Settings with which slabs carry light, each for all that is translucent: scattered again and again, and scattered once where each point of a light saves
-/// a shadow map, or where the scene states half vectors.
-pub(crate) fn alone(scene: &Scene) -> Vec<scene::RenderSettings> {
+/// Render settings with slabs across half vectors, which carry the light of all translucent objects: one that scatters light again and again, and one that
+/// scatters it once. The second saves a shadow map for each point of a light; it is left out where no light has several, unless the scene states half
+/// vectors. Empty where slabs as thin as the finest volume asks for would be too many.
+pub(crate) fn alone(scene: &Scene, facts: &SourceFacts) -> Vec<scene::RenderSettings> {
     let sheets = &scene.render.sheets;
+    let lattices = || facts.media.iter().filter(|medium| medium.is_lattice);
+    let depth = lattices().map(|medium| medium.bounds).reduce(DAabb::union).map_or(0.0, |bounds| bounds.diagonal());
+    let coarsest = lattices().map(|medium| medium.spacing).fold(0.0, f64::max);
+    if !has_slabs(half::foreseen_width(&scene.render, facts), depth, sheets.kernel_extent * coarsest) {
+        return Vec::new();
+    }
     let casts_from_points = scene.lights.iter().any(|light| light.shadow && light.count() > 1);
     let saves_maps = casts_from_points || !sheets.may_slice;
     let once = sheets.carrying_light().filter(|sheets| saves_maps && sheets.scattering().is_none());
@@ -256,23 +263,29 @@ pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSettin
     let precision = points::precision(sheets.accumulation);
     let is_stated = scene.render.stated.accumulation_of_sheets;
     let accumulation = PlannedSetting::new("render.sheets.accumulation", precision, is_stated, points::IN_F32);
-    let across = |value: &str, reason: &str| {
+    let slicing = |value: &str, reason: &str| {
         PlannedSetting::new("render.sheets.slicing", format!("\"{value}\""), !sheets.may_slice, reason)
     };
     let scattering = |value: &str, reason: &str| {
         PlannedSetting::new("render.sheets.scattering", format!("\"{value}\""), !sheets.may_scatter, reason)
     };
     let scene::Slicing::HalfVector { scattering: again, .. } = sheets.slicing else {
-        return vec![accumulation, across("view", "slabs across the view need no sweep for each light")];
+        let reason =
+            "slabs lie across the view unless a scene, or a technique that is `auto`, asks for light that they carry";
+        return vec![accumulation, slicing("view", reason)];
     };
     let often = match again {
-        None => scattering("once", "by its estimate, light that media scatter again is not worth its time"),
+        None if scene.render.is_chosen => scattering(
+            "once",
+            "of the ways that `auto` weighs, this one is the fastest within the tolerance, or errs least",
+        ),
+        None => scattering("once", "a technique that is named scatters light once unless the scene states more"),
         Some(scene::Scattering { back: false, .. }) => {
             scattering("forward", "light that is scattered back is left out")
         }
         Some(_) => scattering("forward_and_back", "by its estimate, light that media scatter again is seen"),
     };
-    vec![accumulation, across("half_vector", "slabs across half vectors carry light through media themselves"), often]
+    vec![accumulation, slicing("half_vector", "slabs across half vectors carry light through media themselves"), often]
 }
 
 pub(crate) use half::carries;

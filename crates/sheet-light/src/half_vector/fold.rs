@@ -20,6 +20,7 @@ use crate::half_vector::slicing::bodies::Bodies;
 use crate::half_vector::slicing::frame::Frame;
 use crate::half_vector::slicing::serves::{axis_of_view, other_axis, serves, serves_extended};
 use crate::shared::pixel::PixelForm;
+use crate::shared::slabs::Slabs;
 use crate::{Error, Params, Reconstruction};
 use splat_core::raster::OpaqueImage;
 use splat_core::shade::ChannelLayout;
@@ -205,6 +206,11 @@ impl<'a> Sweeps<'a, '_> {
         }
         Ok(bytes)
     }
+}
+
+/// Whether there are enough slabs of this width for volumes that lie within this depth and whose kernels have at most this radius; all in one unit of length.
+pub fn has_slabs(width: f64, depth: f64, reach: f64) -> bool {
+    Slabs::new(0.0, depth, width, reach).is_ok()
 }
 
 /// Width of the slabs of the sweep for `light`, or of that without one; world units. Infinite without bodies.

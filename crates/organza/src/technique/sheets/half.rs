@@ -10,6 +10,7 @@ use crate::frame::matter::{Carries, CarriesLight, Matter};
 use crate::frame::{Extent, Frame};
 use crate::pass;
 use crate::scene::{self, LightPoint, RenderSettings, Scene, SceneLight, Slicing, SoftShadows, Technique};
+use crate::statistics::SourceFacts;
 use crate::technique::{Asked, OwnWork, Session};
 use crate::{CostRecord, Error, RenderOptions, stage};
 use sheet_light::Params;
@@ -108,6 +109,12 @@ pub(super) fn light_pixels(scene: &Scene) -> f64 {
     }
 }
 
+/// Width of the slabs of media that are not converted yet, world units: as stated, or the least spacing of all on lattices.
+pub(super) fn foreseen_width(settings: &RenderSettings, facts: &SourceFacts) -> f64 {
+    let spacings = facts.media.iter().filter(|medium| medium.is_lattice).map(|medium| medium.spacing);
+    settings.sheets.slab_width.unwrap_or_else(|| spacings.fold(f64::INFINITY, f64::min))
+}
+
 /// Work on an object that is not converted yet: on the samples of a medium on a lattice, or on the pixels of a mesh, from which lights are looked at.
 pub(super) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     let Slicing::HalfVector { light_pixels, soft_shadows, .. } = asked.settings.sheets.slicing else {
@@ -123,9 +130,11 @@ pub(super) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     let points_of_whole: f64 = shining().filter(is_whole).map(|light| light.count() as f64).sum();
     let sweeps = points - points_of_whole + shining().filter(is_whole).count() as f64;
     let seen = Extent::new(&medium.bounds, camera);
-    let width = asked.settings.sheets.slab_width.unwrap_or(medium.spacing);
+    let width = foreseen_width(asked.settings, asked.facts);
+    // A slab is as thin as the finest volume asks for, and so is the step of the light's image.
+    let slabs_of_a_voxel = medium.spacing / width;
     let eye = seen.share * (medium.spacing * seen.samples_per_unit).powi(2);
-    let samples_of_a_voxel = medium.spacing / width * (eye + light_pixels * light_pixels);
+    let samples_of_a_voxel = slabs_of_a_voxel * (eye + (light_pixels * slabs_of_a_voxel).powi(2));
     let medium_samples = sweeps.max(1.0) * medium.splats * samples_of_a_voxel;
     let has_meshes = asked.facts.meshes.iter().any(|mesh| mesh.stays_triangles);
     OwnWork {
