@@ -1,4 +1,4 @@
-//! Attributes of single points through the whole command: ellipses, shadow coefficients, opacities and extinctions by a column, masses.
+//! Attributes of single points through the whole command: ellipses, balls, shadow coefficients, opacities and extinctions by a column, masses.
 //! Each changes the picture as a closed form says.
 
 use organza_tests::{draw_in, largest_difference, mean_and_ripple, organza, parallel_view, window};
@@ -303,5 +303,24 @@ fn light_falls_on_particles_where_they_are_and_within_thick_splats() {
         // Single scattering in truth; by the centres of kernels it was 0.53 and 0.45, and less the thicker they are.
         assert!((points - 0.5).abs() < 0.1, "{extinction}: {points}");
         assert!((reference / points - 1.0).abs() < 1e-3, "{reference} {points}");
+    }
+}
+
+#[test]
+fn a_point_that_is_a_ball_looks_alike_from_all_sides_and_is_as_large_as_its_radius() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "x y z radius\n0 0 0 0.6\n");
+    let light =
+        "[[light]]\nkind = 'directional'\ndirection = [0, 0, -1]\nirradiance = [3.14159265, 3.14159265, 3.14159265]\n";
+    for rotate in ["[0, 0, 0]", "[40, 20, 0]", "[90, 0, 70]"] {
+        let keys = format!("discs = 'balls'\ntransform = {{ rotate = {rotate} }}\n{light}");
+        let picture = draw_in(folder.path(), &scene(2.0, &keys), &[]);
+        // Its outline has the area of a circle, and light that falls from the eye shows the cosine to its normal: 2/3 in the mean.
+        let pixel = (2.0f64 / 48.0).powi(2);
+        let area: f64 = picture.opacity().iter().sum::<f64>() * pixel;
+        let circle = std::f64::consts::PI * 0.36;
+        assert!((area / circle - 1.0).abs() < 0.03, "{rotate}: {area} of {circle}");
+        let brightness = picture.channel("R").iter().sum::<f64>() * pixel / area;
+        assert!((brightness / (2.0 / 3.0) - 1.0).abs() < 0.03, "{rotate}: {brightness}");
     }
 }

@@ -94,7 +94,7 @@ pub fn usual_spacing(mesh: &Mesh, triangles: u64, splat: &SplatParams) -> Option
 /// As the conversion.
 pub fn raw_points(points: &RawPoints, params: &SurfelParams) -> Result<Prediction, ConvertError> {
     surfels::check(points, params)?;
-    Ok(Prediction::exact(points.len() as f64, surfels::column_set(points, params)))
+    Ok(Prediction::exact(surfels::count(points, params) as f64, surfels::column_set(points, params)))
 }
 
 /// Of [`crate::raw_to_matter`].

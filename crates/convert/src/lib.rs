@@ -58,7 +58,7 @@ pub use points::orient::Orientation;
 pub use points::outline::Outline;
 pub use points::point_cells::with_cells;
 pub use points::shown_points::{PointsShown, ShownPoints, shown_points};
-pub use points::surfels::{SurfelParams, SurfelReport, raw_to_surfels};
+pub use points::surfels::{SurfelParams, SurfelReport, raw_to_surfels, scattered_share};
 pub use points::thin::thinned;
 /// The nouns that this crate takes and returns.
 pub use splat_core;

@@ -89,8 +89,8 @@ fn what_no_points_have_is_made_anew_whatever_its_hash() {
     let (plain, _) = converted(&points, &params, folder.path(), 1 << 20);
     let file = files(folder.path()).pop().unwrap();
     let good = fs::read(&file).unwrap();
-    // Behind mark, key and hash the first place: a normal, whether it has a plane, an area, a spacing, two more lengths.
-    let changes = [(0, 9.0f32.to_bits()), (8, f32::NAN.to_bits()), (12, 2), (20, 0xfff0_0000), (28, 0x7ff0_0000)];
+    // Behind mark, key and hash the first place: a normal, what its neighbours lie on, an area, a spacing, two more lengths.
+    let changes = [(0, 9.0f32.to_bits()), (8, f32::NAN.to_bits()), (12, 3), (20, 0xfff0_0000), (28, 0x7ff0_0000)];
     for (at, word) in changes.into_iter().chain([(32, f32::INFINITY.to_bits()), (44, (-1.0f32).to_bits())]) {
         let mut made_up = good.clone();
         made_up[80 + at..84 + at].copy_from_slice(&word.to_le_bytes());

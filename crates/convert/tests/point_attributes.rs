@@ -2,7 +2,7 @@
 
 use convert::{
     Classified, ColorBy, DiscShape, DiscSize, MatterParams, PointColors, PointsShown, SplatParams, SurfelParams, cost,
-    raw_to_matter, raw_to_surfels, shown_points,
+    raw_to_matter, raw_to_surfels, scattered_share, shown_points,
 };
 use read::{Loaded, ReadParams, bytes};
 use splat_core::glam::{DVec2, DVec3, Vec3};
@@ -266,4 +266,81 @@ fn a_transfer_function_classifies_points_by_any_column() {
     assert_eq!(found.column("extinction", DVec3::Y).unwrap()[10], 1.0);
     assert!(found.opacity == points.opacity && said[0].contains("colours and extinctions"), "{said:?}");
     assert_eq!(shown(Classified::No).0.opacity, points.opacity);
+}
+
+/// Points that fill a cube.
+fn filling(count: u64) -> RawPoints {
+    let at = |i: u64| Vec3::from_array([0, 1, 2].map(|axis| rng::unit(7, 0, i, axis) as f32));
+    RawPoints { position: (0..count).map(at).collect(), ..RawPoints::default() }
+}
+
+#[test]
+fn balls_have_discs_all_around_at_their_radius() {
+    let mut points = filling(1000);
+    points.columns.push(column("radius", &points, |i| 0.01 + 1e-5 * i as f64));
+    points.value = (0..1000).map(|i| i as f32).collect();
+    let transform = Similarity { scale: 2.0, translation: DVec3::new(5.0, -3.0, 1.0), ..Similarity::default() };
+    let splat = SplatParams { transform, ..SplatParams::default() };
+    let balls = SurfelParams { shape: DiscShape::Balls, values: true, splat, ..SurfelParams::default() };
+    let cloud = surfels(&points, &balls);
+    let discs = cloud.len() / 1000;
+    assert_eq!(cloud.len(), 400_000);
+    for ball in (0..1000).map(|ball| ball * discs..(ball + 1) * discs) {
+        let value = cloud.value[ball.start];
+        let radius = 2.0 * (0.01 + 1e-5 * f64::from(value));
+        let middle = transform.apply(points.position[value as usize].as_dvec3());
+        let mut area = 0.0;
+        let mut sum = DVec3::ZERO;
+        for i in ball {
+            let away = cloud.origin + cloud.position[i].as_dvec3() - middle;
+            // The mean square of the distances of its middle and of its rim.
+            let hides = f64::from(Footprint::CORE * cloud.radius[i]);
+            let distance = (radius * radius - 0.5 * hides * hides).sqrt();
+            assert!((away.length() / distance - 1.0).abs() < 1e-4 && cloud.value[i] == value);
+            assert!((away.normalize() - cloud.normal[i].as_dvec3()).length() < 1e-3);
+            area += f64::from(cloud.cross_section[i]);
+            sum += cloud.normal[i].as_dvec3();
+        }
+        assert!((area / (4.0 * std::f64::consts::PI * radius * radius) - 1.0).abs() < 1e-4);
+        assert!(sum.length() < 0.01 * discs as f64, "{sum}");
+    }
+    // A size is a diameter, and counts before what the file says; without either balls are a quarter of the median spacing.
+    let sized = surfels(&points, &SurfelParams { size: Some(DiscSize::World(0.5)), ..balls.clone() });
+    points.columns.clear();
+    let (unsized_balls, report) = raw_to_surfels(&points, &balls, None).unwrap();
+    for (cloud, radius) in [(sized, 0.25), (unsized_balls, 0.25 * report.median_spacing)] {
+        let away = cloud.position[0].as_dvec3() - cloud.position[discs / 2].as_dvec3();
+        assert!(away.length() < 2.0 * radius && away.length() > radius, "{away}, {radius}");
+    }
+    // Few balls have more discs, many have few.
+    for (count, expected) in [(3, 3 * 512), (100_000, 600_000)] {
+        assert_eq!(surfels(&filling(count), &balls).len(), expected);
+    }
+}
+
+#[test]
+fn what_lies_on_no_surface_is_told_from_what_lies_on_one() {
+    for count in [2000, 100_000] {
+        let share = scattered_share(&filling(count));
+        assert!(share > 0.8, "{count}: {share}");
+    }
+    assert_eq!(scattered_share(&filling(31)), 0.0);
+    // A plane, one that is rough by a tenth of its spacing, lines of a scan, and a ball of few points are surfaces.
+    let mut rough = lines(30, 1.0);
+    for (i, p) in rough.position.iter_mut().enumerate() {
+        p.y = 0.1 * rng::unit(3, 0, i as u64, 0) as f32;
+    }
+    let on_ball = |i: u64| {
+        let z = 2.0 * rng::unit(5, 0, i, 0) - 1.0;
+        let (sin, cos) = (std::f64::consts::TAU * rng::unit(5, 0, i, 1)).sin_cos();
+        DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z).as_vec3()
+    };
+    let ball = RawPoints { position: (0..500).map(on_ball).collect(), ..RawPoints::default() };
+    for surface in [lines(30, 1.0), rough, lines(30, 3.0), ball] {
+        let share = scattered_share(&surface);
+        assert!(share < 0.05, "{share}");
+    }
+    // All at one place, and places that are no numbers.
+    assert_eq!(scattered_share(&RawPoints { position: vec![Vec3::ONE; 100], ..RawPoints::default() }), 0.0);
+    assert_eq!(scattered_share(&RawPoints { position: vec![Vec3::NAN; 100], ..RawPoints::default() }), 0.0);
 }

@@ -71,6 +71,26 @@ fn estimates_text(plan: &Plan) -> String {
     text + "errs by about: an estimate of the change of a pixel as it is displayed, of black to white; it is no bound\n\n"
 }
 
+/// What the plan compared as a table; nothing where there was one choice alone.
+fn compared_text(plan: &Plan) -> String {
+    const MOST_ROWS: usize = 24;
+    if plan.compared.is_empty() {
+        return String::new();
+    }
+    let rows = plan.compared.iter().take(MOST_ROWS).map(|one| {
+        let error = one.displayed_error;
+        let share = if error.is_finite() { share_text(error) } else { "not known".to_owned() };
+        let object = one.object.clone().unwrap_or_else(|| "all".to_owned());
+        let is_taken = if one.is_taken { "yes" } else { "no" };
+        [object, one.drawn_by.clone(), is_taken.to_owned(), share, duration_text(one.seconds), one.reason.clone()]
+    });
+    let mut text = table(["compared for", "drawn by", "taken", "errs by about", "takes", "why"], "lllrrl", rows);
+    if plan.compared.len() > MOST_ROWS {
+        let _ = writeln!(text, "and {} more; `--json` has all of them", plan.compared.len() - MOST_ROWS);
+    }
+    text + "takes: of one core, counted before anything is converted; objects share passes, so their sum may be more than a picture takes\n\n"
+}
+
 /// The plan as a table.
 pub(super) fn plan_text(plan: &Plan, predicted: &Prediction) -> String {
     let threads = rayon::current_num_threads();
@@ -97,6 +117,7 @@ pub(super) fn plan_text(plan: &Plan, predicted: &Prediction) -> String {
              takes, bytes: predicted for what runs for it alone; - where that is part of passes that run in any case\n";
     text.push('\n');
     text += &estimates_text(plan);
+    text += &compared_text(plan);
     let settings = plan.settings.iter().map(|setting| {
         let by = if setting.is_stated { "scene" } else { "plan" };
         [setting.key.clone(), setting.value.clone(), by.to_owned(), setting.reason.clone()]

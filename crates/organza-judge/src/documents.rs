@@ -3,7 +3,7 @@
 use crate::effects::{EffectChange, FixedEffect, Measured};
 use organza::cost::{CountedPass, EffectWork, Prediction};
 use organza::plan::{Estimate, Plan, PlannedObject, PlannedSetting};
-use organza::scene::{FoundCamera, Scene, SceneObject, UpBy};
+use organza::scene::{ComparedTechnique, FoundCamera, Scene, SceneObject, UpBy};
 use organza::{CostRecord, Expected, GivenUp, ShadowTable, SplatCount, WithinGoal};
 use serde_json::{Value, json};
 
@@ -117,6 +117,7 @@ pub fn plan_json(plan: &Plan) -> Value {
         "technique": plan.technique,
         "effects": effects.collect::<Value>(),
         "estimates": plan.estimates.iter().map(|e| estimate_json(plan, e)).collect::<Value>(),
+        "compared": plan.compared.iter().map(compared_json).collect::<Value>(),
         "settings": plan.settings.iter().map(setting_json).collect::<Value>(),
         "passes": passes.collect::<Value>(),
         "optical_depth_planes": plan.optical_depth_planes,
@@ -133,6 +134,16 @@ fn estimate_json(plan: &Plan, estimate: &Estimate) -> Value {
         // JSON has no infinity: an error that is not known is none.
         "displayed_error": error.is_finite().then_some(error),
         "draws": plan.is_drawn_as(estimate), "reason": estimate.words,
+    })
+}
+
+fn compared_json(compared: &ComparedTechnique) -> Value {
+    let error = compared.displayed_error;
+    json!({
+        "object": compared.object, "drawn_by": compared.drawn_by,
+        // As in estimates.
+        "displayed_error": error.is_finite().then_some(error),
+        "seconds": compared.seconds, "taken": compared.is_taken, "reason": compared.reason,
     })
 }
 

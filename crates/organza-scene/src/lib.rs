@@ -51,10 +51,10 @@ pub use object::points_look::PointsLook;
 pub use paths::{PATH_KEYS, ROOT_KEY, folder_above, relative_path, root_for};
 pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
 pub use render::settings::{
-    Aligned, Bending, Classify, Collisions, Coverage, Goal, Grouping, OpaqueSurfels, ParticlesSettings, PointsSettings,
-    Reconstruction, RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing,
-    SoftShadows, Stated, SurfaceSampler, SurfelGroups, SurfelLayers, SurfelsSettings, Technique, TechniqueKey,
-    VolumeSampler,
+    Aligned, Bending, Classify, Collisions, ComparedTechnique, Coverage, Goal, Grouping, OpaqueSurfels,
+    ParticlesSettings, PointsSettings, Reconstruction, RenderSettings, Scattering, ShadowMapping, ShadowSettings,
+    SheetKernel, SheetsSettings, Slicing, SoftShadows, Stated, SurfaceSampler, SurfelGroups, SurfelLayers,
+    SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
 };
 pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};

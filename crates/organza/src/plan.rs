@@ -6,7 +6,7 @@
 pub use crate::form::{Form, PlannedObject};
 use crate::load::Loaded;
 use crate::pass;
-use crate::scene::{EffectKind, LightPoint, SwitchedEffect, Technique};
+use crate::scene::{ComparedTechnique, EffectKind, LightPoint, SwitchedEffect, Technique};
 use crate::shadows::ShadowTable;
 use splat_core::Object;
 
@@ -140,6 +140,8 @@ pub struct Plan {
     pub effects: Vec<Effect>,
     /// What the techniques that draw err by, and those that `auto` may take in their place, by object.
     pub estimates: Vec<Estimate>,
+    /// What the plan compared to choose the techniques that the scene leaves to it; empty where there was one choice alone.
+    pub compared: Vec<ComparedTechnique>,
     /// Effects of objects that are left out by their bounds: the picture is that of a scene without their causes.
     pub left_out: Vec<SwitchedEffect>,
     /// Settings that have a part in the picture and that a scene may leave to the plan.

@@ -319,8 +319,8 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
     let visible = || scene.objects.iter().zip(0..).filter(|(object, _)| object.visible);
     let shows = |object: &SceneObject| !scene.materials[object.material].material.bounds_matter();
     let is_other = |by: &BySeen| by.technique != first.technique;
-    let is_named =
-        !scene.render.is_chosen && visible().all(|(object, _)| technique_of(object, scene) == scene.render.technique);
+    let is_named = scene.render.choice.is_none()
+        && visible().all(|(object, _)| technique_of(object, scene) == scene.render.technique);
     if !is_named || !seen.translucent.iter().any(is_other) || !visible().all(|(object, _)| shows(object)) {
         return None;
     }

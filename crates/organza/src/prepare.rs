@@ -520,6 +520,7 @@ fn plan_effects(
     plan.draws = plan.by.iter().zip(&plan.is_own).map(|(by, is_own)| draws(by) && !is_own).collect();
     techniques(scene).into_iter().for_each(|t| (row(t).plans)(scene, loaded, &mut plan));
     plan.estimates = settle::all_estimates(scene, &loaded.facts);
+    plan.compared = scene.render.choice.clone().unwrap_or_default();
     Ok(Effects { statistics, plan, census, shadowing: Some(shadowing) })
 }
 

@@ -262,6 +262,7 @@ fn objects() -> Vec<Entry> {
         one("object.point_size", "object.it.point_size={world=0.05}")
             .but(All, Refused(2, "`point_size` belongs to `points`")),
         of(RAW, "object.discs", "object.it.discs='elliptical'"),
+        of(RAW, "object.discs", "object.it.discs='balls'"),
         one("object.discs", "object.it.discs='elliptical'").but(All, Refused(2, "`discs` belongs to `points`")),
         of(HEAT, "object.point_size.world", "object.it.point_size.world=0.05")
             .with(&["object.it.point_size={world=0.1}"]),

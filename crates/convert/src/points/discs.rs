@@ -6,6 +6,7 @@ use crate::{SplatParams, SurfelParams};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::points::attributes::{FOOTPRINT, MATERIAL, RADIUS, TANGENT};
 use splat_core::{Camera, Footprint, RawPoints};
+use std::f64::consts::PI;
 
 /// The shape of discs whose points state none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -15,6 +16,32 @@ pub enum DiscShape {
     Round,
     /// As long and wide as the points' own cells: lines of a scan are not blurred along for the gaps between them.
     Elliptical,
+    /// A ball of discs about each point, for points that lie on no surface.
+    Balls,
+}
+
+/// Discs of all balls together, as long as that makes none of too few or of more than are seen.
+const BALL_DISCS: usize = 400_000;
+const DISCS_OF_BALL: [usize; 2] = [6, 512];
+/// Radius of balls that state none, in median spacings: they touch some of their neighbours.
+const BALL_RADIUS: f64 = 0.25;
+/// Radius within which discs of a ball hide over the root of their area: on a Fibonacci lattice no place is farther from the nearest.
+const BALL_COVER: f64 = 0.9;
+/// Least distance of discs from the middle of their ball, over its radius.
+const LEAST_DISTANCE: f64 = 0.4;
+
+/// Directions from the middle of each of so many balls to its discs, spread evenly.
+pub(crate) fn ball_directions(balls: usize) -> Vec<Vec3> {
+    let [least, most] = DISCS_OF_BALL;
+    let count = (BALL_DISCS / balls.max(1)).clamp(least, most);
+    let golden_angle = PI * (3.0 - 5.0f64.sqrt());
+    let direction = |k: usize| {
+        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+        let across = (1.0 - z * z).sqrt();
+        let turn = golden_angle * k as f64;
+        DVec3::new(across * libm::cos(turn), across * libm::sin(turn), z).as_vec3()
+    };
+    (0..count).map(direction).collect()
 }
 
 /// The diameter within which an opaque disc hides what is behind it.
@@ -57,6 +84,13 @@ pub(crate) struct Disc {
     pub(crate) area: f64,
 }
 
+/// The discs of a ball, which are alike.
+pub(crate) struct BallDiscs {
+    pub(crate) disc: Disc,
+    /// From the middle of the ball, world units.
+    pub(crate) distance: f64,
+}
+
 /// What says how the discs of some points lie.
 pub(crate) struct Discs<'a> {
     points: &'a RawPoints,
@@ -72,8 +106,30 @@ impl<'a> Discs<'a> {
         Self { points, params, radius: stated(RADIUS), tangent: x.zip(y).zip(z).map(|((x, y), z)| [x, y, z]) }
     }
 
+    /// Radius of the ball about point `i`, world units; `median_spacing` in these, too.
+    pub(crate) fn ball_radius(&self, i: usize, median_spacing: f64) -> f64 {
+        let t = &self.params.splat.transform;
+        let place = || t.apply(self.points.origin + self.points.position[i].as_dvec3());
+        let by_size = self.params.size.and_then(|size| size.at(place(), self.params.camera.as_ref()));
+        let stated = by_size.map(|diameter| 0.5 * diameter).or_else(|| Some(self.radius?[i] * t.scale));
+        stated.unwrap_or(BALL_RADIUS * median_spacing)
+    }
+
+    /// The discs of a ball of this radius, `count` of them.
+    pub(crate) fn discs_of_ball(&self, radius: f64, count: usize) -> BallDiscs {
+        let area = 4.0 * PI * radius * radius / count as f64;
+        let hides = BALL_COVER * area.sqrt();
+        let disc = Disc { radius: hides / f64::from(Footprint::CORE), tangent: DVec3::ZERO, area };
+        // The outline goes from middles of discs to their rims: it has the ball's area in the mean.
+        let distance = (radius * radius - 0.5 * hides * hides).max(0.0).sqrt().max(LEAST_DISTANCE * radius);
+        BallDiscs { disc, distance }
+    }
+
     /// Whether some may be ellipses.
     pub(crate) fn are_elliptical(&self) -> bool {
+        if self.params.shape == DiscShape::Balls {
+            return false;
+        }
         let by_cells = self.radius.is_none() && self.params.size.is_none();
         self.tangent.is_some() || by_cells && self.params.shape == DiscShape::Elliptical
     }
@@ -129,6 +185,16 @@ pub(crate) fn unused_by_discs(
     let radius = has(RADIUS);
     let missing = TANGENT.into_iter().find(|name| !has(name));
     let tangent = TANGENT.into_iter().find(|name| has(name));
+    if shape == DiscShape::Balls {
+        said.extend(tangent.map(|name| format!("`{name}` is not used: balls are alike on all sides")));
+        if !points.normal.is_empty() {
+            said.push("normals are not used: balls have their own".to_owned());
+        }
+        if radius && has_size {
+            said.push(format!("`{RADIUS}` is not used beside `point_size`"));
+        }
+        return said;
+    }
     match (tangent, missing) {
         (Some(name), Some(missing)) => said.push(format!("`{name}` is not used: a tangent has `{missing}` too")),
         (Some(name), None) if has_size => said.push(format!("`{name}` is not used beside `point_size`")),

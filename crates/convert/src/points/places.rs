@@ -5,7 +5,7 @@ use crate::points::cell_ellipse::ellipse;
 use crate::points::discs::DiscShape;
 use crate::points::neighbours::{MAX_NEIGHBOURS, MAX_WAITING, Nearest, Tree, WIDTH, Waiting};
 use crate::points::orient;
-use crate::points::tangent_plane::{Offset, fit_normals};
+use crate::points::tangent_plane::{Offset, fit_planes};
 use crate::points::voronoi_cell::voronoi_sides;
 use crate::{ConvertError, SurfelParams};
 use bytemuck::{Pod, Zeroable};
@@ -21,7 +21,7 @@ const LEAVES: usize = 64;
 #[repr(C)]
 pub(crate) struct Place {
     pub(crate) normal: Vec3,
-    /// 0 for a guess, else 1.
+    /// Whether its neighbours lie on a plane: [`Place::LINE`], [`Place::PLANE`] or [`Place::SCATTERED`].
     pub(crate) plane: u32,
     /// Object units².
     pub(crate) area: f64,
@@ -33,6 +33,15 @@ pub(crate) struct Place {
     pub(crate) across: f32,
 }
 
+impl Place {
+    /// The normal is a guess: the neighbours lie on a line, or there are none.
+    pub(crate) const LINE: u32 = 0;
+    /// They lie near a plane.
+    pub(crate) const PLANE: u32 = 1;
+    /// They lie about as far from the plane as along it.
+    pub(crate) const SCATTERED: u32 = 2;
+}
+
 #[cfg(feature = "cache")]
 impl Place {
     /// Whether a place of finite points can be so.
@@ -40,7 +49,7 @@ impl Place {
         let is_length = |length: f64| length.is_finite() && length >= 0.0;
         let lengths = [self.area, self.spacing, f64::from(self.across)];
         (self.normal.is_normalized() || self.normal == Vec3::ZERO)
-            && self.plane <= 1
+            && self.plane <= Self::SCATTERED
             && lengths.into_iter().all(is_length)
             && self.long.is_finite()
     }
@@ -144,14 +153,14 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
     let Some(farthest) = offsets.last() else {
         let spacing = params.lone_spacing / params.splat.transform.scale;
         let normal = orient::guess(params.orientation, DVec3::ZERO).as_vec3();
-        out.fill(Place { normal, plane: 0, area: spacing * spacing, spacing, ..Place::default() });
+        out.fill(Place { normal, plane: Place::LINE, area: spacing * spacing, spacing, ..Place::default() });
         return;
     };
-    let planes = fit_normals(offsets);
+    let planes = fit_planes(offsets);
     let mut normals = [DVec3::ZERO; WIDTH];
     for i in 0..WIDTH {
         let line = || DVec3::new(farthest[0][i].into(), farthest[1][i].into(), farthest[2][i].into());
-        normals[i] = planes[i].unwrap_or_else(|| orient::guess(params.orientation, line()));
+        normals[i] = planes[i].map_or_else(|| orient::guess(params.orientation, line()), |plane| plane.normal);
     }
     let lines = voronoi_sides(offsets, &normals);
     let cells = lines.cells();
@@ -160,9 +169,13 @@ fn leaf_places(offsets: &[Offset], params: &SurfelParams, out: &mut [Place]) {
         let root = area.sqrt();
         let spacing = (std::f64::consts::SQRT_2 * cells.reach[i]).clamp(root, 2.0 * root);
         let normal = normals[i].as_vec3();
-        let plane = planes[i].is_some().into();
+        let plane = match planes[i] {
+            None => Place::LINE,
+            Some(plane) if plane.is_scattered => Place::SCATTERED,
+            Some(_) => Place::PLANE,
+        };
         let (long, across) = match params.shape {
-            DiscShape::Round => (Vec3::ZERO, 0.0),
+            DiscShape::Round | DiscShape::Balls => (Vec3::ZERO, 0.0),
             DiscShape::Elliptical => {
                 let (long, across) = ellipse(&lines, &cells, i, spacing);
                 (long.as_vec3(), across as f32)

@@ -11,6 +11,8 @@
 //! Points may have sizes of their discs, and a tangent each, along which a disc is an ellipse. Without them ellipses may be as long and
 //! wide as the cells ([`crate::points::cell_ellipse`]). K is unchanged: a wider disc blurs the surface and does not thicken it.
 //!
+//! Points that lie on no surface may be balls: discs on the ball about each, which has the radius that the point states.
+//!
 //! Points at one place share the area of that place, so duplicates neither darken it nor shrink radii to 0.
 
 use crate::ConvertError;
@@ -19,7 +21,7 @@ use crate::common::cache::Key;
 use crate::common::columns::{self, CHUNK, ColumnSet};
 use crate::common::convert_error::check_cancelled;
 use crate::common::params::SplatParams;
-use crate::points::discs::{DiscShape, DiscSize, Discs};
+use crate::points::discs::{Disc, DiscShape, DiscSize, Discs, ball_directions};
 use crate::points::materials::materials_of;
 use crate::points::matter::check_columns;
 use crate::points::neighbours::MAX_NEIGHBOURS;
@@ -30,7 +32,7 @@ use crate::splats::footprints::choose_footprints;
 use crate::splats::{from_splats, gaussian_points};
 use rayon::prelude::*;
 use splat_core::RawPoints;
-use splat_core::points::attributes::{FOOTPRINT, SHADOW_COEFFICIENT};
+use splat_core::points::attributes::{FOOTPRINT, RADIUS, SHADOW_COEFFICIENT};
 use splat_core::text::counted;
 use splat_core::{
     Camera, Cloud, Progress, SplatKind,
@@ -110,7 +112,7 @@ impl SurfelReport {
     /// Warns that points at one place have each become a surfel, in a sentence without a full stop.
     pub fn said(&self) -> Option<String> {
         let lie = if self.duplicates == 1 { "lies" } else { "lie" };
-        (self.duplicates > 0 && self.splats == self.points)
+        (self.duplicates > 0 && self.splats >= self.points)
             .then(|| format!("{} {lie} where another one lies", counted(self.duplicates, "point")))
     }
 }
@@ -159,26 +161,70 @@ pub fn raw_to_surfels(
     let order = canonical_order(points);
     check_cancelled(progress)?;
     let (distinct, starts) = distinct_places(points, &order);
+    let is_ball = params.shape == DiscShape::Balls;
     let has_normals = points.normal.len() == points.len()
         && points.normal.par_iter().with_min_len(CHUNK).all(|n| columns::unit_or_zero(*n) != Vec3::ZERO);
-    let mut places = if has_normals && matches!(params.size, Some(DiscSize::World(_))) {
+    let states_size = matches!(params.size, Some(DiscSize::World(_)));
+    let mut places = if (has_normals || is_ball) && (states_size || is_ball && points.own_column(RADIUS).is_some()) {
         // The size tells the area too, so nothing of a place is asked for.
         progress.add_total(distinct.len() as u64);
-        vec![Place { plane: 1, ..Place::default() }; distinct.len()]
+        vec![Place { plane: Place::PLANE, ..Place::default() }; distinct.len()]
     } else {
-        let orientation = known_orientation(&distinct, params, progress)?;
+        let turns = !(has_normals || is_ball);
+        let orientation =
+            if is_ball { Orientation::Propagate } else { known_orientation(&distinct, params, progress)? };
         let params = &SurfelParams { orientation, ..params.clone() };
-        places_with_normals(&distinct, points.origin, params, !has_normals, progress)?
+        places_with_normals(&distinct, points.origin, params, turns, progress)?
     };
     let mut report = SurfelReport {
         points: points.len() as u64,
         duplicates: (points.len() - distinct.len()) as u64,
-        without_plane: places.par_iter().with_min_len(CHUNK).filter(|p| p.plane == 0).count() as u64,
+        without_plane: places.par_iter().with_min_len(CHUNK).filter(|p| p.plane == Place::LINE).count() as u64,
         ..SurfelReport::default()
     };
     cut_outliers(&mut places, params, &mut report);
     let cloud = emit(points, params, &Sorted { order, starts, places }, &mut report)?;
     Ok((cloud, report))
+}
+
+/// The share of points that lie on no surface: their ten neighbours lie about as far from the plane that fits them best as along it, as those of particles do
+/// that fill space. Told by some runs of points along a curve through all of them; 0 for fewer than 32 places, and for points that no conversion takes.
+///
+/// ```
+/// use splat_core::RawPoints;
+/// use splat_core::glam::Vec3;
+/// let at = |i: usize| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32);
+/// let filled = RawPoints { position: (0..1000).map(at).collect(), ..RawPoints::default() };
+/// let flat = RawPoints { position: (0..100).map(at).collect(), ..RawPoints::default() };
+/// assert!(convert::scattered_share(&filled) > 0.5 && convert::scattered_share(&flat) == 0.0);
+/// ```
+pub fn scattered_share(points: &RawPoints) -> f64 {
+    const FEW_PLACES: usize = 32;
+    // Of more points every nth tells.
+    const MOST_POINTS: usize = 1 << 22;
+    const RUNS: usize = 64;
+    const RUN: usize = 1024;
+    if points.validate().is_err() {
+        return 0.0;
+    }
+    let nth = points.len().div_ceil(MOST_POINTS).max(1);
+    let some = RawPoints { position: points.position.iter().step_by(nth).copied().collect(), ..RawPoints::default() };
+    let (distinct, _) = distinct_places(&some, &canonical_order(&some));
+    if distinct.len() < FEW_PLACES {
+        return 0.0;
+    }
+    let starts = (0..distinct.len()).step_by(distinct.len().div_ceil(RUNS).max(RUN));
+    let runs =
+        starts.map(|start| &distinct[start..distinct.len().min(start + RUN)]).filter(|run| run.len() > FEW_PLACES);
+    let params = SurfelParams::default();
+    let mut looked_at = 0;
+    let mut scattered = 0;
+    for run in runs {
+        let Ok((places, _)) = places(run, &params, false, &Progress::new()) else { continue };
+        looked_at += places.len();
+        scattered += places.iter().filter(|place| place.plane == Place::SCATTERED).count();
+    }
+    scattered as f64 / looked_at.max(1) as f64
 }
 
 /// Places whose normals point to the side that is asked for, if `turns` says so; those that are kept of the same points, where something is.
@@ -216,11 +262,15 @@ fn place_key(distinct: &[Vec3], origin: DVec3, params: &SurfelParams, turns: boo
     };
     let lone = params.lone_spacing / params.splat.transform.scale;
     let numbers = [params.neighbours as u64, side, params.shape as u64];
-    Key::new(if turns { "places" } else { "places with normals of any side" })
-        .with(distinct)
-        .with(&numbers)
-        .with(&[at])
-        .with(&[lone])
+    Key::new(if turns {
+        "places, of surfaces or scattered"
+    } else {
+        "places with normals of any side, of surfaces or scattered"
+    })
+    .with(distinct)
+    .with(&numbers)
+    .with(&[at])
+    .with(&[lone])
 }
 
 /// The orientation, where it depends on what the points enclose: told by some of them, which lie evenly among all.
@@ -244,7 +294,7 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     let p = &params.splat;
     p.check()?;
     points.validate().and_then(|()| check_columns(points, false)).map_err(|e| p.input(e))?;
-    p.check_count(points.len() as f64)?;
+    p.check_count(count(points, params) as f64)?;
     if !(0.0..=1.0).contains(&params.opacity) {
         return Err(p.bad("opacity", params.opacity, "a number in [0, 1]"));
     }
@@ -262,7 +312,7 @@ pub(crate) fn check(points: &RawPoints, params: &SurfelParams) -> Result<(), Con
     if let (Some(size), Some(expected)) = (params.size, expected_size) {
         return Err(p.bad("size", size, expected));
     }
-    if let (DiscShape::Elliptical, Some(expected)) = (params.shape, expected_size) {
+    if let (DiscShape::Elliptical | DiscShape::Balls, Some(expected)) = (params.shape, expected_size) {
         return Err(p.bad("discs", params.shape, expected));
     }
     if let Some(size) = params.size.filter(|size| !size.is_length()) {
@@ -302,20 +352,40 @@ struct Sorted {
     places: Vec<Place>,
 }
 
+/// What a surfel is made of.
+#[derive(Debug, Clone, Copy)]
+struct Origin {
+    place: u32,
+    point: u32,
+    /// How many surfels share the place.
+    sharers: u32,
+    /// Which of the directions of a ball it lies in; 0 of a disc.
+    direction: u32,
+}
+
 impl Sorted {
-    /// Place, first point and number of sharers of each surfel.
-    fn surfels(&self, merge: bool) -> Vec<(u32, u32, u32)> {
-        let mut surfels = Vec::with_capacity(self.order.len());
+    /// What each surfel is made of: as many of each point as a ball has discs, else one.
+    fn surfels(&self, merge: bool, discs_of_each: usize) -> Vec<Origin> {
+        let mut surfels = Vec::with_capacity(self.order.len() * discs_of_each);
         for (place, range) in self.starts.windows(2).enumerate() {
-            let sharers = range[1] - range[0];
-            if merge {
-                surfels.push((place as u32, self.order[range[0] as usize], 1));
-            } else {
-                surfels.extend((range[0]..range[1]).map(|s| (place as u32, self.order[s as usize], sharers)));
+            let places = if merge { range[0]..range[0] + 1 } else { range[0]..range[1] };
+            let sharers = places.len() as u32;
+            for at in places {
+                let origin = Origin { place: place as u32, point: self.order[at as usize], sharers, direction: 0 };
+                surfels.extend((0..discs_of_each as u32).map(|direction| Origin { direction, ..origin }));
             }
         }
         surfels
     }
+}
+
+/// Surfels that points become.
+pub(crate) fn count(points: &RawPoints, params: &SurfelParams) -> u64 {
+    (points.len() * discs_of_each(points.len(), params)) as u64
+}
+
+fn discs_of_each(points: usize, params: &SurfelParams) -> usize {
+    if params.shape == DiscShape::Balls { ball_directions(points).len() } else { 1 }
 }
 
 /// Which columns surfels fill.
@@ -359,7 +429,8 @@ fn emit(
     report: &mut SurfelReport,
 ) -> Result<Cloud, ConvertError> {
     let t = &params.splat.transform;
-    let surfels = sorted.surfels(params.merge_duplicates);
+    let directions = if params.shape == DiscShape::Balls { ball_directions(points.len()) } else { vec![Vec3::ZERO] };
+    let surfels = sorted.surfels(params.merge_duplicates, directions.len());
     let of_surface = crossing_depth(params.opacity);
     let crossing = |point: u32| match points.opacity.get(point as usize) {
         Some(opacity) => crossing_depth(params.opacity * f64::from(*opacity)),
@@ -371,49 +442,62 @@ fn emit(
     let kind = if filled.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };
     columns::size_columns(&mut cloud, surfels.len(), kind, filled, &params.splat)?;
     let discs = Discs::new(points, params);
+    let is_ball = params.shape == DiscShape::Balls;
+    let median_spacing = report.median_spacing;
     // In the axes of the file.
-    let normal_of = |place: u32, point: u32| {
-        let given = points.normal.get(point as usize).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
-        if given == Vec3::ZERO { sorted.places[place as usize].normal } else { given }
+    let normal_of = |surfel: &Origin| {
+        if is_ball {
+            return directions[surfel.direction as usize];
+        }
+        let given = points.normal.get(surfel.point as usize).map_or(Vec3::ZERO, |n| columns::unit_or_zero(*n));
+        if given == Vec3::ZERO { sorted.places[surfel.place as usize].normal } else { given }
     };
-    let disc_of =
-        |place: u32, point: u32| discs.disc(point as usize, &sorted.places[place as usize], normal_of(place, point));
+    let ball_of = |point: u32| discs.discs_of_ball(discs.ball_radius(point as usize, median_spacing), directions.len());
+    let disc_of = |surfel: &Origin| -> Disc {
+        if is_ball {
+            return ball_of(surfel.point).disc;
+        }
+        discs.disc(surfel.point as usize, &sorted.places[surfel.place as usize], normal_of(surfel))
+    };
     let columns =
         (&mut cloud.position, &mut cloud.normal, &mut cloud.radius, &mut cloud.cross_section, &mut cloud.color);
     columns.into_par_iter().zip(&surfels).with_min_len(CHUNK).for_each(
-        |((position, normal, radius, cross_section, color), &(place, point, sharers))| {
-            let disc = disc_of(place, point);
-            let i = point as usize;
-            *position = (t.rotation * (points.position[i].as_dvec3() * t.scale)).as_vec3();
-            *normal = t.rotate(normal_of(place, point).as_dvec3()).as_vec3();
+        |((position, normal, radius, cross_section, color), surfel)| {
+            let disc = disc_of(surfel);
+            let i = surfel.point as usize;
+            let turned = t.rotate(normal_of(surfel).as_dvec3());
+            let middle = t.rotation * (points.position[i].as_dvec3() * t.scale);
+            let from_middle = if is_ball { turned * ball_of(surfel.point).distance } else { DVec3::ZERO };
+            *position = (middle + from_middle).as_vec3();
+            *normal = turned.as_vec3();
             *radius = disc.radius as f32;
-            *cross_section = (crossing(point).unwrap_or(1.0) * disc.area / f64::from(sharers)) as f32;
+            *cross_section = (crossing(surfel.point).unwrap_or(1.0) * disc.area / f64::from(surfel.sharers)) as f32;
             *color = points.color.get(i).filter(|_| params.colors).copied().unwrap_or(params.splat.color);
         },
     );
     let tangents = cloud.tangent.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
-    tangents.for_each(|(tangent, &(place, point, _))| *tangent = disc_of(place, point).tangent.as_vec3());
+    tangents.for_each(|(tangent, surfel)| *tangent = disc_of(surfel).tangent.as_vec3());
     let optics = (&mut cloud.crossing_depth, &mut cloud.kind).into_par_iter().zip(&surfels).with_min_len(CHUNK);
-    optics.for_each(|((depth, kind), &(_, point, _))| match crossing(point) {
+    optics.for_each(|((depth, kind), surfel)| match crossing(surfel.point) {
         Some(tau) => *depth = tau as f32,
         None => (*depth, *kind) = (0.0, SplatKind::Opaque),
     });
     let shares = points.own_column(SHADOW_COEFFICIENT).unwrap_or_default();
     let coefficients = cloud.shadow_coefficient.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
-    coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.1 as usize] as f32);
+    coefficients.for_each(|(coefficient, s)| *coefficient = shares[s.point as usize] as f32);
     let values = cloud.value.par_iter_mut().zip(&surfels).with_min_len(CHUNK);
-    values.for_each(|(v, s)| *v = points.value[s.1 as usize]);
+    values.for_each(|(v, s)| *v = points.value[s.point as usize]);
     if let Some(material_of) = materials_of(points, &params.splat)? {
         cloud
             .material
             .par_iter_mut()
             .zip(&surfels)
             .with_min_len(CHUNK)
-            .for_each(|(id, s)| *id = material_of(s.1 as usize).id);
+            .for_each(|(id, s)| *id = material_of(s.point as usize).id);
     }
     let ids = points.own_column(FOOTPRINT);
-    let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].1 as usize]);
-    let place = |k: usize| points.position[surfels[k].1 as usize];
+    let stated = |k: usize| ids.map_or(0.0, |ids| ids[surfels[k].point as usize]);
+    let place = |k: usize| points.position[surfels[k].point as usize];
     choose_footprints(&mut cloud, &params.splat, place, ids.map(|_| &stated as _))?;
     Ok(cloud)
 }

@@ -18,6 +18,10 @@ pub(crate) type Offset = [Lanes; 3];
 /// line: every vector across it would do.
 const LINE: f64 = 1e-6;
 
+/// Least eigenvalue over the trace from which on points lie on no surface: 1/3 where they lie alike in all directions, some 0.02 on a plane and
+/// some 0.2 among ten neighbours of a filled space.
+const SCATTERED: f64 = 0.08;
+
 /// Most steps of Newton's method; about five are usual.
 const STEPS: usize = 24;
 
@@ -30,26 +34,36 @@ struct Symmetric {
     mixed: [Eight; 3],
 }
 
-/// Unit vectors across the planes that fit eight points and their neighbours best, or `None` where these lie on a line or at one
-/// place.
+/// A plane that fits a point and its neighbours best.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Fitted {
+    /// Unit vector across it.
+    pub(crate) normal: DVec3,
+    /// Whether they lie about as far from it as along it.
+    pub(crate) is_scattered: bool,
+}
+
+/// The planes of eight points and their neighbours, or `None` where these lie on a line or at one place.
 #[inline(always)]
-pub(crate) fn fit_normals(offsets: &[Offset]) -> [Option<DVec3>; WIDTH] {
+pub(crate) fn fit_planes(offsets: &[Offset]) -> [Option<Fitted>; WIDTH] {
     let mut matrix = Symmetric::covariances(offsets);
     matrix.scale_to_one();
     let smallest = matrix.smallest_eigenvalues();
+    let [x, y, z] = matrix.diagonal;
     for diagonal in &mut matrix.diagonal {
         for i in 0..WIDTH {
             diagonal[i] -= smallest[i];
         }
     }
     let columns = matrix.longest_columns();
-    let mut normals = [None; WIDTH];
+    let mut planes = [None; WIDTH];
     for i in 0..WIDTH {
         let column = DVec3::new(columns[0][i], columns[1][i], columns[2][i]);
         let length = column.length();
-        normals[i] = (length > LINE).then(|| column / length);
+        let is_scattered = smallest[i] > SCATTERED * (x[i] + y[i] + z[i]);
+        planes[i] = (length > LINE).then(|| Fitted { normal: column / length, is_scattered });
     }
-    normals
+    planes
 }
 
 impl Symmetric {
@@ -183,9 +197,9 @@ mod tests {
     /// The same neighbours for all, around a point that is not at their mean.
     fn normal(offsets: &[DVec3]) -> Option<DVec3> {
         let lanes: Vec<Offset> = offsets.iter().map(|o| o.as_vec3().to_array().map(|c| [c; WIDTH])).collect();
-        let normals = fit_normals(&lanes);
-        assert!(normals.iter().all(|n| *n == normals[0]));
-        normals[0]
+        let planes = fit_planes(&lanes);
+        assert!(planes.iter().all(|plane| *plane == planes[0]));
+        planes[0].map(|plane| plane.normal)
     }
 
     #[test]

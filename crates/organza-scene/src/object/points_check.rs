@@ -75,7 +75,12 @@ pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, E
         color_by: color_by()?,
         keep: keep.collect::<Result<_, _>>()?,
         unlit: raw.unlit,
-        shape: if raw.discs == Some(RawDiscShape::Elliptical) { DiscShape::Elliptical } else { DiscShape::Round },
+        shape: match raw.discs {
+            None | Some(RawDiscShape::Auto) => None,
+            Some(RawDiscShape::Round) => Some(DiscShape::Round),
+            Some(RawDiscShape::Elliptical) => Some(DiscShape::Elliptical),
+            Some(RawDiscShape::Balls) => Some(DiscShape::Balls),
+        },
         keeps_values: false,
         size: raw.point_size.as_ref().map(|size| check_size(&at.key("point_size"), size)).transpose()?,
     })

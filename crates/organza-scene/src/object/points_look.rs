@@ -13,8 +13,8 @@ pub struct PointsLook {
     pub keep: Vec<Kept>,
     /// Whether they are drawn without light; `None` where that follows from their file.
     pub unlit: Option<bool>,
-    /// How their discs lie, where neither `size` nor the file says so.
-    pub shape: DiscShape,
+    /// How their discs lie, where neither `size` nor the file says so; `None` where that follows from whether they lie on a surface.
+    pub shape: Option<DiscShape>,
     /// Diameter of their discs; `None` where it follows from their neighbours.
     pub size: Option<DiscSize>,
     /// Whether splats keep a number each: the point's value, or that of its colour column. Pictures do not need it.
@@ -70,7 +70,7 @@ impl SceneObject {
             spacing: self.spacing.filter(|_| !self.source.is_medium()).map(|spacing| spacing / self.transform.scale),
             color_by: self.points.color_by.as_ref(),
             as_matter: self.source.is_medium(),
-            shape: self.points.shape,
+            shape: self.points.shape.unwrap_or_default(),
             has_size: self.points.size.is_some(),
             has_opacity: self.opacity.is_some(),
             has_field: self.field.is_some(),

@@ -52,6 +52,8 @@ pub(crate) struct RawPointSize {
 #[serde(rename_all = "lowercase")]
 #[schemars(rename = "DiscShape")]
 pub(crate) enum RawDiscShape {
+    Auto,
     Round,
     Elliptical,
+    Balls,
 }

@@ -36,7 +36,7 @@ pub(crate) fn check_render(at: &At<'_>, raw: &RawRender) -> Result<RenderSetting
     let technique = check_technique(at, raw.technique.as_deref().unwrap_or("auto"))?;
     Ok(RenderSettings {
         technique,
-        is_chosen: false,
+        choice: None,
         antialias: at.whole("antialias", Whole::stated(raw.antialias).unwrap_or(2), 1..=8)?,
         stated: Stated {
             antialias: Whole::stated(raw.antialias).is_some(),

@@ -1,16 +1,16 @@
 //! Settings that a scene may leave to the plan by `"auto"`: the value of each that has a part in the picture, and the reason.
 
 use super::row;
+use crate::cost::duration_text;
 use crate::load::Loaded;
 use crate::plan::{Plan, PlannedSetting};
-use crate::scene::{Scene, SceneLight};
+use crate::scene::{ComparedTechnique, Scene, SceneLight};
 
 /// The settings of a picture that is planned but for them: the technique, the samples of a pixel, those of lights, and what techniques add.
 pub(crate) fn settings(scene: &Scene, loaded: &Loaded, plan: &Plan) -> Vec<PlannedSetting> {
     let render = &scene.render;
-    let because = "of all techniques it is the fastest whose estimated error is within the tolerance, or else the one that errs least";
     let mut settings = vec![
-        PlannedSetting::new("render.technique", format!("\"{}\"", plan.technique), !render.is_chosen, because),
+        PlannedSetting::new("render.technique", format!("\"{}\"", plan.technique), render.choice.is_none(), &why(plan)),
         PlannedSetting::new(
             "render.antialias",
             render.antialias,
@@ -22,6 +22,36 @@ pub(crate) fn settings(scene: &Scene, loaded: &Loaded, plan: &Plan) -> Vec<Plann
     settings.extend(shining.filter_map(|(light, _)| samples_of(light)));
     settings.extend(plan.techniques.iter().flat_map(|technique| (row(*technique).settings)(scene, loaded, plan)));
     settings
+}
+
+/// Errors below it are told as nothing.
+const LEAST_TOLD: f64 = 5e-4;
+
+/// Why the techniques were taken that draw.
+fn why(plan: &Plan) -> String {
+    let weight = |one: &ComparedTechnique| {
+        let error = match one.displayed_error {
+            error if !error.is_finite() => "its error is not known".to_owned(),
+            error if error < LEAST_TOLD => "errs by nothing".to_owned(),
+            error => format!("errs by {:.1} %", 100.0 * error),
+        };
+        format!("{} takes {}, {error}", one.drawn_by, duration_text(one.seconds))
+    };
+    let is_of_whole = |one: &&ComparedTechnique| one.object.is_none();
+    let taken = plan.compared.iter().find(|one| one.is_taken && one.object.is_none());
+    match (taken, &plan.compared[..]) {
+        (Some(taken), compared) => {
+            let compared: Vec<String> = compared.iter().filter(is_of_whole).map(weight).collect();
+            format!("{}, of one core and about: {}", taken.reason, compared.join("; "))
+        }
+        (None, []) => "no other technique draws its objects better".to_owned(),
+        (None, [first, ..]) if plan.compared.iter().all(|one| one.object == first.object) => {
+            let compared: Vec<String> = plan.compared.iter().map(weight).collect();
+            let reason = plan.compared.iter().find(|one| one.is_taken).map_or("", |one| &one.reason);
+            format!("{reason}, of one core and about: {}", compared.join("; "))
+        }
+        (None, compared) => format!("each object has its own, of {} that were compared", compared.len()),
+    }
 }
 
 /// The points that stand for the size of a light; `None` for one without a size.

@@ -8,7 +8,7 @@ use crate::choose::technique_of;
 use crate::cost::{Count, CountedPass, ENTRIES_PER_SPLAT, Item, Rates, Translucent, samples};
 use crate::load::source_facts;
 use crate::plan::Estimate;
-use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
+use crate::scene::{ComparedTechnique, EffectKind, RenderSettings, Scene, SceneObject, SwitchedEffect, Technique};
 use crate::statistics::{MediumFacts, SourceFacts};
 use crate::technique::{Asked, Row, TABLE, estimates, row};
 use crate::{Context, Error, pass};
@@ -36,16 +36,27 @@ pub(crate) fn settled<'s>(scene: Cow<'s, Scene>, context: Context<'_>) -> Result
     let switched = SwitchedEffect::find(&scene.render.effects, EffectKind::Scatter, "");
     let has_layer = scene.render.layers.names().any(|name| name == SCATTERED);
     let asked_for = has_layer || switched == Some(true);
-    let fits = |way: &Way| !way.carries_light || bytes(&scene, &facts, way) <= context.options.max_memory;
-    let is_wanted = |way: &Way| if way.scatters_again { switched != Some(false) } else { !asked_for };
-    let ways: Vec<Way> = ways(&scene, &facts).filter(is_wanted).filter(fits).collect();
+    let mut ways: Vec<Way> = ways(&scene, &facts).collect();
+    for way in &mut ways {
+        way.refusal = if way.scatters_again && switched == Some(false) {
+            Some("the scene switches `scatter` off".to_owned())
+        } else if !way.scatters_again && asked_for {
+            Some("the scene asks for light that is scattered again and again".to_owned())
+        } else {
+            let needed = if way.carries_light { bytes(&scene, &facts, way) } else { 0 };
+            let limit = context.options.max_memory;
+            (needed > limit).then(|| format!("it needs {needed} bytes, the limit is {limit}"))
+        };
+    }
     let Some(way) = chosen(&ways, scene.render.tolerance) else {
         let what = if has_layer { "the layer `scatterN`" } else { "the effect `scatter`, which is on" };
         let message = format!("{what}: no technique that `auto` chooses scatters light again and again here");
         let hint = "leave it out, or let `auto` choose for all translucent objects";
         return Err(Error::input(crate::printable(&scene.file), message, hint));
     };
-    Ok(Cow::Owned(with(&scene, way)))
+    let mut settled = with(&scene, way);
+    settled.render.choice = Some(compared(&scene, &facts, &ways, way));
+    Ok(Cow::Owned(settled))
 }
 
 /// The layer of light that media scatter again.
@@ -78,6 +89,16 @@ struct Way {
     /// Whether light is carried through media by what draws them, and whether that scatters it again and again.
     carries_light: bool,
     scatters_again: bool,
+    /// Whether one technique draws all objects that the scene leaves to the plan; else each is drawn by what suits it.
+    is_of_one: bool,
+    weight: Weight,
+    /// Why it cannot be taken, whatever its weight is.
+    refusal: Option<String>,
+}
+
+/// What techniques are compared by.
+#[derive(Debug, Clone, Copy)]
+struct Weight {
     /// The greatest estimate of a change of a displayed pixel.
     displayed_error: f64,
     /// Seconds of one thread by the built-in figures.
@@ -88,7 +109,10 @@ struct Way {
 fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Way> + 'a {
     let plain = std::iter::once_with(|| {
         let by = scene.objects.iter().enumerate().map(|(rank, object)| match technique_of(object, scene) {
-            Technique::Auto => suiting(&asked(scene, rank, facts, &scene.render)),
+            Technique::Auto => {
+                let candidates = candidates(&asked(scene, rank, facts, &scene.render));
+                suiting(&candidates, scene.render.tolerance).map_or(TABLE[0].technique, |one| one.technique)
+            }
             named => named,
         });
         way(scene, facts, by.collect(), scene.render.clone())
@@ -109,7 +133,8 @@ fn ways<'a>(scene: &'a Scene, facts: &'a SourceFacts) -> impl Iterator<Item = Wa
             medium.is_lattice && by[medium.object] == row.technique && (!scatters || medium.albedo > 0.0)
         };
         let draws_all = scene.objects.iter().enumerate().filter(|(_, object)| object.visible).all(draws);
-        (draws_all && facts.media.iter().any(serves)).then(|| way(scene, facts, by, settings))
+        let is_way = draws_all && facts.media.iter().any(serves);
+        is_way.then(|| Way { is_of_one: true, ..way(scene, facts, by, settings) })
     });
     plain.chain(alone)
 }
@@ -122,24 +147,112 @@ fn asked<'a>(scene: &'a Scene, rank: usize, facts: &'a SourceFacts, settings: &'
 /// A technique that may draw an object by itself.
 struct Candidate {
     technique: Technique,
-    displayed_error: f64,
-    seconds: f64,
+    weight: Weight,
 }
 
-/// The technique that suits an object by itself, with the settings of the scene: of those within the tolerance the fastest, else the one that errs
-/// least, and of equal ones the first of the table.
-fn suiting(asked: &Asked<'_>) -> Technique {
+/// The techniques that may draw an object by itself, with the settings of the scene.
+fn candidates(asked: &Asked<'_>) -> Vec<Candidate> {
     let offered = TABLE.iter().filter(|row| (row.is_offered)(asked));
-    let candidate = |row: &Row| Candidate {
-        technique: row.technique,
-        displayed_error: greatest(&estimates(row.technique, asked)),
-        seconds: seconds(row, asked),
+    let candidate = |row: &Row| {
+        let displayed_error = greatest(&estimates(row.technique, asked));
+        Candidate { technique: row.technique, weight: Weight { displayed_error, seconds: seconds(row, asked) } }
     };
-    let candidates: Vec<Candidate> = offered.map(candidate).collect();
-    let sufficient = candidates.iter().filter(|one| one.displayed_error <= asked.settings.tolerance);
-    let fastest = sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let best = fastest.or_else(|| candidates.iter().min_by(|a, b| a.displayed_error.total_cmp(&b.displayed_error)));
-    best.map_or(TABLE[0].technique, |one| one.technique)
+    offered.map(candidate).collect()
+}
+
+/// The technique that suits an object by itself: of those within the tolerance the fastest, else the one that errs least, and of equal ones the first of
+/// the table.
+fn suiting(candidates: &[Candidate], tolerance: f64) -> Option<&Candidate> {
+    let sufficient = candidates.iter().filter(|one| one.weight.displayed_error <= tolerance);
+    let fastest = sufficient.min_by(|a, b| a.weight.seconds.total_cmp(&b.weight.seconds));
+    let errs_least = || candidates.iter().min_by(|a, b| a.weight.displayed_error.total_cmp(&b.weight.displayed_error));
+    fastest.or_else(errs_least)
+}
+
+/// What was compared where there was more than one choice: the techniques of each object, where each is drawn by what suits it, then the ways of all.
+fn compared(scene: &Scene, facts: &SourceFacts, ways: &[Way], taken: &Way) -> Vec<ComparedTechnique> {
+    let tolerance = scene.render.tolerance;
+    let is_open = |object: &SceneObject| object.visible && technique_of(object, scene) == Technique::Auto;
+    let mut compared = Vec::new();
+    let open = scene.objects.iter().enumerate().filter(|(_, object)| !taken.is_of_one && is_open(object));
+    for (rank, object) in open {
+        let candidates = candidates(&asked(scene, rank, facts, &scene.render));
+        let Some(suiting) = suiting(&candidates, tolerance).filter(|_| candidates.len() > 1) else { continue };
+        compared.extend(candidates.iter().map(|one| ComparedTechnique {
+            object: Some(object.name.clone()),
+            drawn_by: one.technique.name().to_owned(),
+            displayed_error: one.weight.displayed_error,
+            seconds: one.weight.seconds,
+            is_taken: one.technique == suiting.technique,
+            reason: if one.technique == suiting.technique {
+                reason_for(one.weight, candidates.iter().map(|other| other.weight), tolerance).to_owned()
+            } else {
+                reason_against(one.weight, suiting.weight, tolerance).to_owned()
+            },
+        }));
+    }
+    if ways.len() < 2 {
+        return compared;
+    }
+    let possible = || ways.iter().filter(|way| way.refusal.is_none()).map(|way| way.weight);
+    compared.extend(ways.iter().map(|way| {
+        let is_taken = std::ptr::eq(way, taken);
+        let reason = if is_taken {
+            reason_for(way.weight, possible(), tolerance).to_owned()
+        } else {
+            way.refusal.clone().unwrap_or_else(|| reason_against(way.weight, taken.weight, tolerance).to_owned())
+        };
+        ComparedTechnique {
+            object: None,
+            drawn_by: way.drawn_by(scene),
+            displayed_error: way.weight.displayed_error,
+            seconds: way.weight.seconds,
+            is_taken,
+            reason,
+        }
+    }));
+    compared
+}
+
+/// Why a technique is taken of some.
+fn reason_for(taken: Weight, compared: impl Iterator<Item = Weight>, tolerance: f64) -> &'static str {
+    let mut compared = compared;
+    if taken.displayed_error <= tolerance {
+        "the fastest that errs within the tolerance"
+    } else if compared.any(|other| other.displayed_error < taken.displayed_error) {
+        "nothing errs within the tolerance, and what errs less takes more than 20 times longer"
+    } else {
+        "nothing errs within the tolerance: it errs least"
+    }
+}
+
+/// Why another technique is taken in the place of one.
+fn reason_against(one: Weight, taken: Weight, tolerance: f64) -> &'static str {
+    let is_sufficient = one.displayed_error <= tolerance;
+    match taken.displayed_error <= tolerance {
+        true if is_sufficient => "it is no faster",
+        true if !one.displayed_error.is_finite() => "what it errs by is not known",
+        true => "it errs by more than the tolerance",
+        false if one.displayed_error < taken.displayed_error => "it takes more than 20 times longer",
+        false => "it errs no less",
+    }
+}
+
+impl Way {
+    /// What draws the objects that the scene leaves to the plan, in words.
+    fn drawn_by(&self, scene: &Scene) -> String {
+        let open = || scene.objects.iter().zip(&self.by).filter(|(object, _)| object.visible);
+        let draws = |row: &&Row| {
+            open().any(|(object, by)| technique_of(object, scene) == Technique::Auto && *by == row.technique)
+        };
+        let names: Vec<&str> = TABLE.iter().filter(draws).map(|row| row.technique.name()).collect();
+        let light = match (self.is_of_one, self.scatters_again) {
+            (true, true) => ", which scatter light again and again",
+            (true, false) => ", which carry light",
+            (false, _) => "",
+        };
+        names.join(" and ") + light
+    }
 }
 
 /// Bytes that the techniques of a way take at most for media, before anything is converted.
@@ -151,7 +264,7 @@ fn bytes(scene: &Scene, facts: &SourceFacts, way: &Way) -> u64 {
 /// Bytes with which a settled scene is settled alike: with fewer the plan would choose otherwise. 0 where it chose nothing that it weighs by memory.
 pub(crate) fn foreseen_bytes(scene: &Scene, facts: &SourceFacts) -> u64 {
     let chosen = |row: &&Row| {
-        let is_weighed = scene.render.is_chosen && (row.carries)(&scene.render).is_some();
+        let is_weighed = scene.render.choice.is_some() && (row.carries)(&scene.render).is_some();
         let is_of_it = |object: &SceneObject| object.is_chosen && technique_of(object, scene) == row.technique;
         is_weighed && scene.objects.iter().any(is_of_it)
     };
@@ -172,7 +285,8 @@ fn way(scene: &Scene, facts: &SourceFacts, by: Vec<Technique>, settings: RenderS
     }
     let carries_light = by.iter().any(|technique| (row(*technique).carries)(&settings).is_some());
     let scatters_again = carries_light && settings.sheets.scattering().is_some();
-    Way { by, settings, carries_light, scatters_again, displayed_error, seconds: time }
+    let weight = Weight { displayed_error, seconds: time };
+    Way { by, settings, carries_light, scatters_again, is_of_one: false, weight, refusal: None }
 }
 
 /// Seconds of one thread that an object takes by a technique, counted before anything is converted.
@@ -209,15 +323,16 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
 /// The way that is taken: of those whose estimate is within the tolerance the fastest; without any, the one that errs least, unless it takes so many
 /// times longer than the fastest that errs by some tolerances.
 fn chosen(ways: &[Way], tolerance: f64) -> Option<&Way> {
-    let sufficient = ways.iter().filter(|way| way.displayed_error <= tolerance);
-    let fastest = sufficient.min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+    let possible = || ways.iter().filter(|way| way.refusal.is_none());
+    let by_seconds = |a: &&Way, b: &&Way| a.weight.seconds.total_cmp(&b.weight.seconds);
+    let fastest = possible().filter(|way| way.weight.displayed_error <= tolerance).min_by(by_seconds);
     if fastest.is_some() {
         return fastest;
     }
-    let best = ways.iter().min_by(|a, b| a.displayed_error.total_cmp(&b.displayed_error))?;
-    let is_near = |way: &&Way| way.displayed_error <= MOST_TOLERANCES * tolerance;
-    let near = ways.iter().filter(is_near).min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    Some(near.filter(|near| best.seconds > MOST_TIMES * near.seconds).unwrap_or(best))
+    let best = possible().min_by(|a, b| a.weight.displayed_error.total_cmp(&b.weight.displayed_error))?;
+    let is_near = |way: &&Way| way.weight.displayed_error <= MOST_TOLERANCES * tolerance;
+    let near = possible().filter(is_near).min_by(by_seconds);
+    Some(near.filter(|near| best.weight.seconds > MOST_TIMES * near.weight.seconds).unwrap_or(best))
 }
 
 /// The scene as a way has it.
@@ -229,7 +344,6 @@ fn with(scene: &Scene, way: &Way) -> Scene {
     let used = |row: &&Row| open().any(|(object, by)| object.visible && *by == row.technique);
     let common = TABLE.iter().find(used).unwrap_or(&TABLE[0]).technique;
     settled.render = way.settings.clone();
-    settled.render.is_chosen = true;
     if settled.render.technique == Technique::Auto {
         settled.render.technique = common;
     }
@@ -392,10 +506,11 @@ mod tests {
             settings: scene.render.clone(),
             carries_light: false,
             scatters_again: false,
-            displayed_error,
-            seconds,
+            is_of_one: false,
+            weight: Weight { displayed_error, seconds },
+            refusal: None,
         };
-        let taken = |ways: &[Way]| chosen(ways, 0.004).map(|way| way.seconds).unwrap();
+        let taken = |ways: &[Way]| chosen(ways, 0.004).map(|way| way.weight.seconds).unwrap();
         assert_eq!(taken(&[way(0.003, 5.0), way(0.001, 7.0)]), 5.0);
         assert_eq!(taken(&[way(0.02, 1.0), way(0.001, 30.0)]), 30.0);
         assert_eq!(taken(&[way(0.02, 1.0), way(0.01, 19.0)]), 19.0);

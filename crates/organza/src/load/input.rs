@@ -10,11 +10,12 @@ use crate::scene::{
 };
 use crate::statistics::{Conversion, ObjectData};
 use convert::{
-    ClassifiedGrid, CloudShape, Density, DensityParams, HomogeneousMedium, LiddedMesh, MatterParams, MediumBody,
-    MeshParams, Section, ShownPoints, SplatParams, SurfaceField, SurfelParams, VolumeParams,
+    ClassifiedGrid, CloudShape, Density, DensityParams, DiscShape, HomogeneousMedium, LiddedMesh, MatterParams,
+    MediumBody, MeshParams, Section, ShownPoints, SplatParams, SurfaceField, SurfelParams, VolumeParams,
 };
 use field::{ClippedField, Inside, MpuParams, SharedField, Solid};
 use pbsr::{BoundedExtinction, Matter};
+use splat_core::points::attributes::TANGENT;
 use splat_core::{Clip, DAabb, Grid, Interpolation, Mesh, RawPoints, Reservation, TransferFunction, optics};
 use std::borrow::Cow;
 use std::path::Path;
@@ -441,8 +442,33 @@ fn raw_points<'a>(
     context.files.scales.borrow_mut().extend(scale);
     Ok(match object.matter_params(&splat) {
         Some(params) => Input::Matter(path, points, params),
-        None => Input::Points(path, points, context.surfel_params(object, splat)),
+        None => {
+            let mut params = context.surfel_params(object, splat);
+            if object.points.shape.is_none() {
+                params.shape = shape_of_most(path, &points, &params, context);
+            }
+            Input::Points(path, points, params)
+        }
     })
+}
+
+/// The shape of discs of points whose object states none: balls where opaque points lie on no surface.
+fn shape_of_most(path: &Path, points: &RawPoints, params: &SurfelParams, context: &ObjectContext<'_>) -> DiscShape {
+    let is_plain = points.normal.is_empty() && points.gaussians.is_empty() && points.ready.cloud.is_empty();
+    let has_tangents = TANGENT.into_iter().any(|name| points.own_column(name).is_some());
+    let is_opaque = params.opacity * f64::from(points.least_opacity()) >= 1.0;
+    if !is_plain || has_tangents || !is_opaque {
+        return DiscShape::default();
+    }
+    let share = convert::scattered_share(points);
+    if share <= 0.5 {
+        return DiscShape::default();
+    }
+    let percent = (100.0 * share).round();
+    let said =
+        format!("{percent} % of the points lie on no surface, so each is a ball; discs = \"round\" makes each a disc");
+    context.files.note(path, Some(said));
+    DiscShape::Balls
 }
 
 /// The field that a surface shows.

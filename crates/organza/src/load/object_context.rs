@@ -92,7 +92,7 @@ impl ObjectContext<'_> {
             values: object.points.keeps_values,
             opacity: self.scene.opacity_of(object),
             largest_spacing: LARGEST_SPACING,
-            shape: object.points.shape,
+            shape: object.points.shape.unwrap_or_default(),
             size: object.points.size,
             camera: Some(self.scene.camera),
             merge_duplicates: object.merge_duplicates || self.options.merge_duplicates,

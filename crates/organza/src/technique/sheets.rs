@@ -275,7 +275,7 @@ pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSettin
         return vec![accumulation, slicing("view", reason)];
     };
     let often = match again {
-        None if scene.render.is_chosen => scattering(
+        None if scene.render.choice.is_some() => scattering(
             "once",
             "of the ways that `auto` weighs, this one is the fastest within the tolerance, or errs least",
         ),
