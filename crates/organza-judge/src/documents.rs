@@ -156,6 +156,7 @@ fn table_json(t: &ShadowTable) -> Value {
     let p = &t.predicted;
     json!({
         "columns": p.size[0], "rows": p.size[1], "cells": p.limit.to_string(), "entries": p.entries as u64, "bytes": p.bytes,
+        "map_bytes": p.map_bytes,
         "absorbance_cut": t.absorbance_cut(),
     })
 }

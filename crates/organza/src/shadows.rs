@@ -7,6 +7,7 @@ mod probe;
 use crate::Error;
 use crate::load::Loaded;
 use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
+use rayon::prelude::*;
 use splat_core::shade::joint::{HIDDEN, MediumSpacing};
 use splat_core::{Camera, Light, LightShape, Limits, Object};
 use tsm::{Deposits, Params};
@@ -15,6 +16,8 @@ pub(crate) use casters::{Shadowing, casting};
 pub(crate) use hiding::{Hiding, View, casters_by_light, hiding};
 pub(crate) use probe::Probe;
 
+/// Splats of a task.
+const CHUNK: usize = 1 << 12;
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
 /// a small share costs little.
 pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
@@ -114,7 +117,8 @@ pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Par
 
 /// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.
 fn thickest(loaded: &Loaded) -> f64 {
-    let thickest = (0..loaded.cloud.len()).map(|i| thickness_of(loaded, i)).fold(0.0, f32::max);
+    let splats = (0..loaded.cloud.len()).into_par_iter().with_min_len(CHUNK);
+    let thickest = splats.map(|i| thickness_of(loaded, i)).reduce(|| 0.0, f32::max);
     if thickest > SEEN { f64::from(thickest) } else { 0.0 }
 }
 

@@ -15,6 +15,7 @@ use crate::shadows::{Coarse, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 pub(crate) use keys::{idle_cells, without_part};
+use rayon::prelude::*;
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};
@@ -154,24 +155,50 @@ struct Thickness {
     bounds: DAabb,
 }
 
+impl Thickness {
+    const NONE: Self = Self { optical_depth: 0.0, spacing: 0.0, bounds: DAabb::EMPTY };
+
+    fn join(&mut self, other: &Self) {
+        self.bounds = self.bounds.union(other.bounds);
+        if other.optical_depth > self.optical_depth {
+            self.optical_depth = other.optical_depth;
+            self.spacing = other.spacing;
+        }
+    }
+}
+
+/// What is known of the medium of each object.
+fn thicknesses(loaded: &Loaded) -> Vec<Thickness> {
+    const PARTS: usize = 64;
+    let splats = loaded.cloud.len();
+    let part = splats.div_ceil(PARTS).max(1 << 12);
+    let of_part = |first: usize| {
+        let mut media = vec![Thickness::NONE; loaded.objects.len()];
+        for i in first..splats.min(first + part) {
+            let Some(spacing) = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i) else { continue };
+            let place = loaded.cloud.position[i].as_dvec3();
+            media[loaded.cloud.object[i] as usize].join(&Thickness {
+                optical_depth: thickness_of(loaded, i),
+                spacing: spacing.width,
+                bounds: DAabb::new(place, place),
+            });
+        }
+        media
+    };
+    let parts: Vec<Vec<Thickness>> = (0..splats).into_par_iter().step_by(part).map(of_part).collect();
+    let mut media = vec![Thickness::NONE; loaded.objects.len()];
+    for found in &parts {
+        media.iter_mut().zip(found).for_each(|(medium, of_part)| medium.join(of_part));
+    }
+    media
+}
+
 /// Media that are so thick that splats do not tell their light, or the maps of sheets that of their edges.
 fn too_thick(scene: &Scene, loaded: &Loaded) -> Vec<String> {
     if scene.lacks_light() {
         return Vec::new();
     }
-    let none = Thickness { optical_depth: 0.0, spacing: 0.0, bounds: DAabb::EMPTY };
-    let mut media = vec![none; loaded.objects.len()];
-    for i in 0..loaded.cloud.len() {
-        let Some(spacing) = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i) else { continue };
-        let medium = &mut media[loaded.cloud.object[i] as usize];
-        let place = loaded.cloud.position[i].as_dvec3();
-        medium.bounds = medium.bounds.union(DAabb::new(place, place));
-        let optical_depth = thickness_of(loaded, i);
-        if optical_depth > medium.optical_depth {
-            medium.optical_depth = optical_depth;
-            medium.spacing = spacing.width;
-        }
-    }
+    let media = thicknesses(loaded);
     let unit = libm::exp2(f64::from(loaded.exponent));
     let told = |(id, (object, medium)): (usize, (&Object, &Thickness))| {
         let planned = loaded.planned.iter().find(|planned| planned.object == object.name)?;

@@ -71,7 +71,7 @@ mod tests {
     use crate::building::caster::Casters;
     use crate::building::deposits::deposit_all;
     use crate::mapping::with_mapping;
-    use crate::planning::lit::{Lit, Rounds};
+    use crate::planning::lit::{Lit, Rounds, Slabs};
     use crate::planning::plan::plan;
     use crate::planning::survey::Survey;
     use crate::shadow_map::head;
@@ -111,7 +111,7 @@ mod tests {
         let light = Light { shape: light, intensity: [1.0; 3] };
         let mut plan = plan(&casters, &survey, &light, &params.limits).unwrap();
         assert!(plan.lit.rounds.is_none(), "so few splats need no look");
-        let (rounds, _) = Rounds::new(&casters, &survey, &plan.frame, plan.table.clone());
+        let (rounds, _) = Rounds::new(&casters, &plan.frame, Slabs::new(&survey, &plan.frame, plan.table.clone()));
         let table = plan.table.clone();
         with_mapping!(&table, m => {
             let opaque = head(&casters, &survey, &plan, m).opaque;

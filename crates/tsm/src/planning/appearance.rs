@@ -24,6 +24,9 @@ pub(crate) struct Appearance {
     spacing: Sizes,
     /// Translucent casters by apparent cutoff radius.
     radius: Sizes,
+    /// Of these the media, and the surfaces by the radius of a ball that covers as much as their disc at its slant.
+    medium: Sizes,
+    slanted: Sizes,
     /// Opaque casters by apparent radius of their dilated disc.
     disc: Sizes,
     /// Bounds on the plane of a planar table, footprints included.
@@ -147,6 +150,8 @@ impl Appearance {
             unit: if apparent == Apparent::Length { f64::from(frame.extent()) } else { 1.0 },
             spacing: Sizes::new(),
             radius: Sizes::new(),
+            medium: Sizes::new(),
+            slanted: Sizes::new(),
             disc: Sizes::new(),
             window: [Vec2::INFINITY, Vec2::NEG_INFINITY],
             cosine: [1.0, -1.0],
@@ -170,15 +175,27 @@ impl Appearance {
         parts.into_iter().fold(Self::empty(frame, apparent), Self::join)
     }
 
-    /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`.
-    fn count(&mut self, casters: &Casters<'_>, i: usize, lengths: [f32; 2], every: u64) {
-        let [unit, radius] = lengths;
+    /// Counts a splat, given the apparent size of a world unit and of its radius, for `every`; `slant` is the cosine of light to the normal of a surface.
+    fn count(
+        &mut self,
+        casters: &Casters<'_>,
+        i: usize,
+        unit: f32,
+        radius: f32,
+        slant: impl FnOnce() -> f32,
+        every: u64,
+    ) {
         let cloud = casters.cloud;
         let spacing = if cloud.kind[i] == SplatKind::Opaque {
             self.disc.add(radius, every);
             cloud.cross_section[i].sqrt() * unit
         } else {
             self.radius.add(radius, every);
+            if cloud.kind[i] == SplatKind::Surface {
+                self.slanted.add(radius * slant().sqrt(), every);
+            } else {
+                self.medium.add(radius, every);
+            }
             cloud.radius[i] / (casters.kernel(i).cutoff * 0.8) * unit
         };
         self.spacing.add(spacing, every);
@@ -199,6 +216,8 @@ impl Appearance {
     fn join(mut self, other: Self) -> Self {
         self.spacing.join(&other.spacing);
         self.radius.join(&other.radius);
+        self.medium.join(&other.medium);
+        self.slanted.join(&other.slanted);
         self.disc.join(&other.disc);
         self.window = [self.window[0].min(other.window[0]), self.window[1].max(other.window[1])];
         self.cosine = [self.cosine[0].min(other.cosine[0]), self.cosine[1].max(other.cosine[1])];
@@ -212,8 +231,8 @@ impl Appearance {
     }
 
     /// Entries that translucent casters make in a table of `cells` cells of side `cell` (angle, tangent or length), where rays begin to sample
-    /// footprints of media at `wide`, and `media` is their share.
-    pub(crate) fn entries(&self, cell: f64, cells: f64, wide: Band, media: f64) -> Entries {
+    /// footprints of media at `wide`.
+    pub(crate) fn entries(&self, cell: f64, cells: f64, wide: Band) -> Entries {
         let parallel = self.apparent == Apparent::Length;
         let by_band = |size, band| {
             // Casters near the light are swept over the whole table.
@@ -222,10 +241,8 @@ impl Appearance {
             Entries { rays: if is_swept { made.rays + cells } else { made.rays }, ..made }
         };
         let mut sum = Entries::default();
-        for (size, count) in self.radius.sizes_and_counts() {
-            sum.add(by_band(size, wide), count * media);
-            sum.add(by_band(size, WIDE), count * (1.0 - media));
-        }
+        self.medium.sizes_and_counts().for_each(|(size, count)| sum.add(by_band(size, wide), count));
+        self.slanted.sizes_and_counts().for_each(|(size, count)| sum.add(by_band(size, WIDE), count));
         sum
     }
 
@@ -351,7 +368,17 @@ impl pulp::NullaryFnOnce for SecondLook<'_> {
             }
             for (l, i) in ids.enumerate().filter(|(l, _)| seen.far[*l] > 0.0) {
                 if i.is_multiple_of(every) {
-                    look.count(casters, i, [unit / seen.far[l], seen.radius[l]], every as u64);
+                    let slant = || {
+                        let normal = frame.turn(casters.cloud.normal_of(i));
+                        let from_light = Vec3::from_array([0, 1, 2].map(|axis| seen.position[axis][l]));
+                        let direction = if apparent == Apparent::Length { Vec3::Z } else { from_light.normalize() };
+                        // A disc that is an ellipse has its longer semi-axis for a radius.
+                        let tangent = casters.cloud.tangent_of(i).length();
+                        let across = casters.cloud.radius[i];
+                        let narrow = if tangent > 0.0 { tangent.min(across) / tangent.max(across) } else { 1.0 };
+                        narrow * normal.dot(direction).abs()
+                    };
+                    look.count(casters, i, unit / seen.far[l], seen.radius[l], slant, every as u64);
                 }
                 if !look.sectors.is_empty() {
                     look.mark_sectors(Vec3::from_array([0, 1, 2].map(|k| seen.position[k][l])), seen.radius[l]);

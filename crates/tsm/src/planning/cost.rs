@@ -82,9 +82,8 @@ pub(crate) fn predict(
     let cells = size[0] * size[1];
     let kinds = survey.kinds;
     let [media, surfaces] = [SplatKind::Medium, SplatKind::Surface].map(|kind| kinds[kind as usize]);
-    let media_share = media as f64 / (media + surfaces).max(1) as f64;
-    let Entries { entries, rays } = look.entries(cell, cells, lit.wide(), media_share);
-    let entries = lit.share * entries;
+    let Entries { entries, rays } = look.entries(cell, cells, lit.wide());
+    let entries = lit.share.min(lit.unhidden) * entries;
     let channels = if survey.coloured { 3.0 } else { 1.0 };
     // A distance and its sum.
     let knot = 4.0 + 4.0 * channels;

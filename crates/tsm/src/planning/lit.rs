@@ -11,6 +11,7 @@ use crate::frame::Frame;
 use crate::mapping::{Mapping, Table, with_mapping};
 use crate::planning::survey::{CHUNK, Survey};
 use rayon::prelude::*;
+use splat_core::glam::Vec3;
 use splat_core::optics::AbsorbanceModel;
 use splat_core::shade::joint::THICK;
 use splat_core::{Footprint, SplatKind};
@@ -26,6 +27,9 @@ const LOOKED_AT: usize = 4096;
 const MANY: u64 = 65_536;
 /// The same of thick media, whose cells are finer.
 const FEW: u64 = 4096;
+/// Clouds of this size and more are looked at by a sample: one splat in so many tells of those about it, which neighbours in the list lie near.
+const SAMPLED: usize = 1 << 18;
+const SAMPLE: usize = 8;
 /// Share of casters that seem to be lit above which the rest saves less than it costs.
 const WORTH: f64 = 0.75;
 /// Absorbance before a caster, over the visible limit, up to which it belongs to each round. The first is what seems to be lit, with room for cells
@@ -41,6 +45,8 @@ const FIXED: f32 = 65_536.0;
 pub(crate) struct Lit {
     /// Share of the casters that seem to be lit, in (0, 1].
     pub(crate) share: f64,
+    /// Share of translucent casters that lie behind nothing opaque, and leave entries; in [0, 1].
+    pub(crate) unhidden: f64,
     /// Rounds in which casters are deposited; `None` where nearly all are lit.
     pub(crate) rounds: Option<Rounds>,
     /// Whether light falls off within a spacing of most media, so that cells have to be fine.
@@ -49,27 +55,38 @@ pub(crate) struct Lit {
 
 impl Lit {
     /// All casters are lit.
-    const EVERYWHERE: Self = Self { share: 1.0, rounds: None, is_steep: false };
+    const EVERYWHERE: Self = Self { share: 1.0, unhidden: 1.0, rounds: None, is_steep: false };
 
-    /// Looks at every medium among the casters through a coarse table.
+    /// Looks at the translucent casters through a coarse table.
     pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> Self {
         let media = survey.kinds[SplatKind::Medium as usize];
-        if media == 0 || casters.params.absorbance == AbsorbanceModel::Paper {
+        let surfaces = survey.kinds[SplatKind::Surface as usize];
+        if media + surfaces == 0 || casters.params.absorbance == AbsorbanceModel::Paper {
             return Self::EVERYWHERE;
+        }
+        let slabs = Slabs::new(survey, frame, coarse);
+        let unhidden = if survey.kinds[SplatKind::Opaque as usize] == 0 {
+            1.0
+        } else {
+            let opaque = slabs.columns_of(casters, frame, |kind| kind == SplatKind::Opaque);
+            slabs.columns_of(casters, frame, |kind| kind != SplatKind::Opaque).share_beside(&opaque)
+        };
+        if media == 0 {
+            return Self { unhidden, ..Self::EVERYWHERE };
         }
         let is_steep = is_thick(casters);
         let many = if is_steep { FEW } else { MANY };
         if media < many {
-            return Self { is_steep, ..Self::EVERYWHERE };
+            return Self { unhidden, is_steep, ..Self::EVERYWHERE };
         }
-        let (rounds, dark) = Rounds::new(casters, survey, frame, coarse);
+        let (rounds, dark) = Rounds::new(casters, frame, slabs);
         let share = survey.casters.saturating_sub(dark).max(1) as f64 / survey.casters as f64;
         if share < WORTH {
-            Self { share, rounds: Some(rounds), is_steep: true }
+            Self { share, unhidden, rounds: Some(rounds), is_steep: true }
         } else if is_steep {
-            Self { share, is_steep, ..Self::EVERYWHERE }
+            Self { share, unhidden, is_steep, ..Self::EVERYWHERE }
         } else {
-            Self::EVERYWHERE
+            Self { unhidden, ..Self::EVERYWHERE }
         }
     }
 
@@ -95,30 +112,39 @@ fn is_thick(casters: &Casters<'_>) -> bool {
     2 * thick > media
 }
 
-/// The round of each caster, by its place.
+/// The cells of a coarse table, in slabs of equal depth.
 #[derive(Debug, Clone)]
-pub(crate) struct Rounds {
+pub(crate) struct Slabs {
     coarse: Table,
     near: f32,
     /// Depth of a slab.
     depth: f32,
+}
+
+/// The round of each caster, by its place.
+#[derive(Debug, Clone)]
+pub(crate) struct Rounds {
+    slabs: Slabs,
     /// Of each cell, slab by slab.
     round: Vec<u8>,
 }
 
-/// Media by cell and slab: how many, and their absorbance.
+/// Casters by cell and slab: how many, and their absorbance.
 struct Columns {
     count: Vec<u32>,
     absorbance: Vec<u64>,
 }
 
-impl Rounds {
-    /// The rounds of casters, and how many do not belong to the first.
-    pub(crate) fn new(casters: &Casters<'_>, survey: &Survey, frame: &Frame, coarse: Table) -> (Self, u64) {
+impl Slabs {
+    pub(crate) fn new(survey: &Survey, frame: &Frame, coarse: Table) -> Self {
         let across = frame.length(survey.bounds.diagonal()) + 2.0 * frame.length(survey.max_radius);
         let near = (frame.extent() - 1.01 * across).max(0.0);
         let depth = ((frame.extent() - near) / SLABS as f32).max(f32::MIN_POSITIVE);
-        let mut rounds = Self { coarse, near, depth, round: Vec::new() };
+        Self { coarse, near, depth }
+    }
+
+    /// The casters of some kinds.
+    fn columns_of(&self, casters: &Casters<'_>, frame: &Frame, is_asked: impl Fn(SplatKind) -> bool + Sync) -> Columns {
         let n = casters.cloud.len();
         // Few large parts: each carries a table.
         let part = CHUNK.max(n.div_ceil(16));
@@ -126,14 +152,71 @@ impl Rounds {
             .into_par_iter()
             .map(|c| {
                 let splats = c * part..n.min((c + 1) * part);
-                with_mapping!(&rounds.coarse, m => rounds.columns(m, casters, frame, splats))
+                with_mapping!(&self.coarse, m => self.columns(m, casters, frame, splats, &is_asked))
             })
             .collect();
-        let Some(columns) = parts.into_iter().reduce(Columns::join) else { return (rounds, 0) };
+        let none = || Columns { count: Vec::new(), absorbance: Vec::new() };
+        parts.into_iter().reduce(Columns::join).unwrap_or_else(none)
+    }
+
+    fn columns<M: Mapping>(
+        &self,
+        coarse: &M,
+        casters: &Casters<'_>,
+        frame: &Frame,
+        splats: Range<usize>,
+        is_asked: impl Fn(SplatKind) -> bool,
+    ) -> Columns {
+        let cloud = casters.cloud;
+        let [width, height] = coarse.size();
+        let len = width as usize * height as usize * SLABS;
+        let mut columns = Columns { count: vec![0; len], absorbance: vec![0; len] };
+        let every = if cloud.len() < SAMPLED { 1 } else { SAMPLE };
+        for i in splats.filter(|i| i.is_multiple_of(every)) {
+            if !is_asked(cloud.kind[i]) || !casters.casts(i) {
+                continue;
+            }
+            let position = frame.position(cloud.position[i]);
+            let Some(slot) = self.slot(coarse, position) else { continue };
+            let cell = slot / SLABS as u32;
+            let area = if coarse.is_parallel() { 1.0 } else { position.length_squared() };
+            let share = if cloud.kind[i] == SplatKind::Opaque {
+                let direction = if coarse.is_parallel() { Vec3::Z } else { position.normalize_or(Vec3::Z) };
+                frame.turn(cloud.normal_of(i)).dot(direction).abs()
+            } else {
+                let [red, green, blue] = casters.extinction(i).rgb;
+                red.min(green).min(blue)
+            };
+            let absorbance =
+                share * frame.area(cloud.cross_section[i]) * coarse.inverse_measure(cell % width, cell / width) / area;
+            columns.count[slot as usize] += every as u32;
+            // The cast saturates, and 2²⁹ of the greatest, eight times, fit 64 bits.
+            columns.absorbance[slot as usize] += every as u64 * u64::from((absorbance * FIXED) as u32);
+        }
+        columns
+    }
+
+    /// Where a position of the light's frame is summed; `None` outside the table.
+    #[inline(always)]
+    fn slot<M: Mapping>(&self, coarse: &M, position: Vec3) -> Option<u32> {
+        let place = coarse.locate(position)?;
+        let [width, height] = coarse.size();
+        let column = (place.at.x.max(0.0) as u32).min(width - 1);
+        let row = (place.at.y.max(0.0) as u32).min(height - 1);
+        let slab = (((place.distance - self.near) / self.depth).max(0.0) as u32).min(SLABS as u32 - 1);
+        Some((row * width + column) * SLABS as u32 + slab)
+    }
+}
+
+impl Rounds {
+    /// The rounds of casters, and how many do not belong to the first.
+    pub(crate) fn new(casters: &Casters<'_>, frame: &Frame, slabs: Slabs) -> (Self, u64) {
+        let media = slabs.columns_of(casters, frame, |kind| kind == SplatKind::Medium);
         let unit = f64::from(casters.params.absorbance_limit()) * f64::from(FIXED);
         let limits = ROUNDS.map(|limit| (limit * unit) as u64);
+        let mut rounds = Self { slabs, round: Vec::with_capacity(media.count.len()) };
         let mut dark = 0;
-        for (counts, absorbances) in columns.count.chunks(SLABS).zip(columns.absorbance.chunks(SLABS)) {
+        for (counts, absorbances) in media.count.chunks(SLABS).zip(media.absorbance.chunks(SLABS)) {
             let mut before = 0;
             for (count, absorbance) in counts.iter().zip(absorbances) {
                 let round = limits.iter().filter(|limit| before >= **limit).count();
@@ -145,43 +228,9 @@ impl Rounds {
         (rounds, dark)
     }
 
-    fn columns<M: Mapping>(&self, coarse: &M, casters: &Casters<'_>, frame: &Frame, splats: Range<usize>) -> Columns {
-        let cloud = casters.cloud;
-        let [width, height] = coarse.size();
-        let len = width as usize * height as usize * SLABS;
-        let mut columns = Columns { count: vec![0; len], absorbance: vec![0; len] };
-        for i in splats {
-            if cloud.kind[i] != SplatKind::Medium || !casters.casts(i) {
-                continue;
-            }
-            let position = frame.position(cloud.position[i]);
-            let Some(slot) = self.slot(coarse, position) else { continue };
-            let cell = slot / SLABS as u32;
-            let area = if coarse.is_parallel() { 1.0 } else { position.length_squared() };
-            let [red, green, blue] = casters.extinction(i).rgb;
-            let least = frame.area(cloud.cross_section[i]) * red.min(green).min(blue);
-            let absorbance = least * coarse.inverse_measure(cell % width, cell / width) / area;
-            columns.count[slot as usize] += 1;
-            // The cast saturates, and 2³² of the greatest fit 64 bits.
-            columns.absorbance[slot as usize] += u64::from((absorbance * FIXED) as u32);
-        }
-        columns
-    }
-
-    /// Where a position of the light's frame is summed; `None` outside the table.
-    #[inline(always)]
-    fn slot<M: Mapping>(&self, coarse: &M, position: splat_core::glam::Vec3) -> Option<u32> {
-        let place = coarse.locate(position)?;
-        let [width, height] = coarse.size();
-        let column = (place.at.x.max(0.0) as u32).min(width - 1);
-        let row = (place.at.y.max(0.0) as u32).min(height - 1);
-        let slab = (((place.distance - self.near) / self.depth).max(0.0) as u32).min(SLABS as u32 - 1);
-        Some((row * width + column) * SLABS as u32 + slab)
-    }
-
     /// The round of each splat; the first for what is no medium.
     pub(crate) fn of_splats(&self, casters: &Casters<'_>, frame: &Frame) -> Vec<u8> {
-        with_mapping!(&self.coarse, m => self.of_splats_in(m, casters, frame))
+        with_mapping!(&self.slabs.coarse, m => self.of_splats_in(m, casters, frame))
     }
 
     fn of_splats_in<M: Mapping>(&self, coarse: &M, casters: &Casters<'_>, frame: &Frame) -> Vec<u8> {
@@ -194,7 +243,7 @@ impl Rounds {
                 if *kind != SplatKind::Medium {
                     continue;
                 }
-                if let Some(slot) = self.slot(coarse, frame.position(*position)) {
+                if let Some(slot) = self.slabs.slot(coarse, frame.position(*position)) {
                     *round = self.round[slot as usize];
                 }
             }
@@ -204,6 +253,23 @@ impl Rounds {
 }
 
 impl Columns {
+    /// The share of these casters that lie behind nothing opaque, where opaque discs lie anyhow in each cell and those of a slab evenly through it.
+    fn share_beside(&self, opaque: &Self) -> f64 {
+        let mut total = 0.0;
+        let mut unhidden = 0.0;
+        for first in (0..self.count.len()).step_by(SLABS) {
+            let mut covered = 0.0;
+            for slot in first..first + SLABS {
+                let coverage = opaque.absorbance[slot] as f64 / f64::from(FIXED);
+                let count = f64::from(self.count[slot]);
+                total += count;
+                unhidden += count * libm::exp(-covered - 0.5 * coverage);
+                covered += coverage;
+            }
+        }
+        if total > 0.0 { unhidden / total } else { 1.0 }
+    }
+
     fn join(mut self, other: Self) -> Self {
         self.count.iter_mut().zip(other.count).for_each(|(to, from)| *to += from);
         self.absorbance.iter_mut().zip(other.absorbance).for_each(|(to, from)| *to += from);
