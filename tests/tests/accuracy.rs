@@ -263,7 +263,7 @@ fn what_was_not_measured_is_null() {
     let settings = document["techniques"][0]["settings"].as_array().unwrap();
     let failed = settings.iter().find(|s| s["setting"] == "slabs: 16").unwrap();
     assert!(failed["seconds"].is_null() && failed["from_limit"].is_null() && failed["from_truth"].is_null());
-    assert_eq!(failed["failure"], "the table needs 9 bytes, the limit is 1");
+    assert_eq!(failed["failure"], "the table needs 9 bytes, the limit is 1 bytes");
     let csv = report.csv();
     assert!(csv.lines().any(|l| l.contains(",\"slabs\",\"slabs: 16\",\"slabs\",false,false,,,")));
     // Every line says of which scene and by what: tables of several runs can be joined.

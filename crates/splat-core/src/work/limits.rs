@@ -90,7 +90,7 @@ impl std::fmt::Display for Exceeded {
             needed => write!(f, "{what} needs {needed} {unit}")?,
         }
         match limit {
-            Some(limit) => write!(f, ", the limit is {limit}"),
+            Some(limit) => write!(f, ", the limit is {limit} {unit}"),
             None => write!(f, ", the system has no memory for them"),
         }
     }
@@ -104,15 +104,15 @@ mod tests {
     fn what_is_exceeded_is_said_in_one_sentence() {
         let hint = "use a larger spacing".into();
         let few = Exceeded { what: "a cloud".into(), needed: 3, limit: Some(2), unit: "splats", hint };
-        assert_eq!(few.to_string(), "a cloud needs 3 splats, the limit is 2");
+        assert_eq!(few.to_string(), "a cloud needs 3 splats, the limit is 2 splats");
         let many = Exceeded { needed: u64::MAX, limit: None, ..few.clone() };
         assert_eq!(
             many.to_string(),
             "a cloud needs more splats than can be counted, the system has no memory for them"
         );
         let rounded = Exceeded { needed: 10_u64.pow(18), ..few.clone() };
-        assert_eq!(rounded.to_string(), "a cloud needs 1.000e18 splats, the limit is 2");
+        assert_eq!(rounded.to_string(), "a cloud needs 1.000e18 splats, the limit is 2 splats");
         let named = few.owned_by("object 'fog'", "");
-        assert_eq!(named.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2");
+        assert_eq!(named.to_string(), "object 'fog': a cloud needs 3 splats, the limit is 2 splats");
     }
 }

@@ -234,7 +234,7 @@ mod tests {
         part.hold("c", 20).unwrap();
         assert_eq!((account.used(), account.left(), part.left()), (90, 10, 10));
         let refused = account.take("d", 11).unwrap_err();
-        assert_eq!(refused.to_string(), "d beside the 90 that are taken needs 11 bytes, the limit is 100");
+        assert_eq!(refused.to_string(), "d beside the 90 that are taken needs 11 bytes, the limit is 100 bytes");
         assert_eq!(first.set("a", 51).unwrap_err().needed, 11);
         first.set("a", 50).unwrap();
         assert_eq!(account.left(), 0);
