@@ -22,6 +22,12 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         ("a.zip", b"PK\x03\x04", "a zip archive", "extract"),
         ("a.tar.gz", &tar, "a tar archive", "extract"),
         ("lod-meta.json", b"{\"lodLevels\": 3}", "a streamed scene of SOG parts", "name the meta.json"),
+        (
+            "index.json",
+            b"{\"origin\": [0, 0, 0], \"vtkClass\": \"vtkImageData\"}",
+            "a data set of vtk.js",
+            "copy the one of an image",
+        ),
         ("a.mtl", b"newmtl a", "OBJ materials", "give the OBJ file"),
         ("scene.toml", b"[camera]", "a scene", "organza render"),
         // The content counts, whatever the name says.
@@ -35,4 +41,22 @@ fn formats_that_are_not_read_are_named_with_what_to_do() {
         assert!(error.to_string().starts_with(&beginning), "{error}");
         assert!(error.hint.contains(hint), "{error}");
     }
+}
+
+/// A data set of vtk.js is a folder with an index: both have the same message, which does not lead from one to the other.
+#[test]
+fn a_folder_of_vtk_js_is_named_once() {
+    let folder = std::env::temp_dir().join(format!("organza-vtk-js-{}.vti", std::process::id()));
+    std::fs::create_dir_all(folder.join("data")).unwrap();
+    let index = folder.join("index.json");
+    std::fs::write(&index, r#"{"vtkClass": "vtkImageData", "extent": [0, 1, 0, 1, 0, 1]}"#).unwrap();
+    let said = |path: &std::path::Path| {
+        let error = read::file(path, &read::ReadParams::default(), None).unwrap_err();
+        assert_eq!(error.fault, Fault::Input);
+        (error.found, error.hint)
+    };
+    let (found, hint) = said(&folder);
+    assert_eq!(found, "a data set of vtk.js, which is not read");
+    assert_eq!(said(&index), (found, hint));
+    std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -31,6 +31,8 @@ const IMAGE: &str =
 const STACK: &str = "a stack of slices is read from TIFF: save it so, such as with Fiji (File > Save As > Tiff)";
 const LEVELS: &str = "name the meta.json or the .sog file of one of its parts";
 const SCENE: &str = "it is a scene, not data: give it to `organza render`";
+const VTK_JS: &str = "its arrays are raw numbers in gzip: copy the one of an image out of its folder `data` to a name with the sizes and the type that index.json states, \
+    such as ct_256x256x133_uint8.raw.gz, and state its `spacing` as `voxel_size` of the volume; save other data sets as .vtp or .vtu";
 
 const fn by_extension(name: &'static str, extensions: &'static [&'static str], hint: &'static str) -> Unread {
     Unread { name, marks: &[], extensions, hint }
@@ -184,7 +186,8 @@ fn unknown(head: &[u8]) -> &'static str {
 }
 
 /// Formats of JSON that are no scene, by a key or a word that scenes have not.
-const IN_JSON: [(&[u8], Unread); 4] = [
+const IN_JSON: [(&[u8], Unread); 5] = [
+    (b"\"vtkClass\"", by_extension("a data set of vtk.js", &[], VTK_JS)),
     (b"\"lodLevels\"", by_extension("a streamed scene of SOG parts", &[], LEVELS)),
     (b"\"geometricError\"", by_extension("a tileset of 3D Tiles", &[], TILES)),
     (b"\"CityJSON\"", by_extension("CityJSON", &[], "convert it to OBJ or glTF, such as with cjio")),
@@ -225,6 +228,10 @@ pub(crate) fn folder(path: &Path) -> ReadError {
             "a folder of Zarr, which is not read",
             hint,
         );
+    }
+    // Its index lies beside a folder of arrays.
+    if let Some(error) = files.iter().find_map(|file| json(&beginning(file))) {
+        return error;
     }
     let found = files.iter().find_map(|file| marked(&beginning(file)).or_else(|| by_name(file)));
     let (found, hint) = match found.map(|unread| unread.name) {
