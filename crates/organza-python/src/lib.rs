@@ -13,6 +13,7 @@ mod calls;
 mod data;
 mod documents;
 mod errors;
+mod legends;
 mod picture;
 mod running;
 mod view;

@@ -2,6 +2,7 @@
 
 use crate::arrays;
 use crate::errors::{raised, refused};
+use crate::legends::{Legend, named};
 use crate::wording;
 use convert::ColorScale;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -15,9 +16,6 @@ use serde_json::{Value, json};
 use splat_core::{LayerData, Layers};
 use std::path::PathBuf;
 
-/// The column that the argument `values` of points and meshes becomes.
-const VALUES: &str = "value";
-
 /// A picture that was drawn.
 #[pyclass(frozen, module = "organza._organza")]
 pub(crate) struct Picture {
@@ -26,8 +24,8 @@ pub(crate) struct Picture {
     /// Camera, plan, costs, predictions, warnings and notes, as JSON.
     facts: String,
     has_background: bool,
-    /// Scales of the colours; `None` of a picture from another process, which sends layers alone.
-    scales: Option<Vec<ColorScale>>,
+    /// Scales of the colours.
+    scales: Vec<ColorScale>,
 }
 
 impl Picture {
@@ -68,7 +66,7 @@ impl Picture {
         });
         let facts = wording::document(facts);
         let has_background = scene.background != [0.0; 3] || scene.environment.is_some();
-        let scales = Some(render.scales.into_iter().map(named).collect());
+        let scales = render.scales.into_iter().map(named).collect();
         Self { metadata, facts: facts.to_string(), has_background, layers: render.layers, scales }
     }
 
@@ -90,22 +88,9 @@ impl Picture {
                 return Err(refused("legend", "True, False, 'over' or 'beside'", &format!("'{other}'")));
             }
         };
-        let legend = match (&self.scales, legend.is_some()) {
-            (_, false) => Vec::new(),
-            (Some(scales), true) => scales.clone(),
-            (None, true) => {
-                let found = "one from another process, which sends layers without their legends; save it there";
-                return Err(refused("legend", "a picture that was drawn in this process", found));
-            }
-        };
+        let legend = if legend.is_some() { self.scales.clone() } else { Vec::new() };
         Ok(Params { half, deep, transparent, has_background: self.has_background, legend, legend_place })
     }
-}
-
-/// A scale with the name that a user gave: `values` of a call are a column of no name, and their object has one.
-fn named(scale: ColorScale) -> ColorScale {
-    let column = scale.column.filter(|column| column != VALUES);
-    ColorScale { column, ..scale }
 }
 
 /// The text of a scene with the settings that were taken in the place of its goal: in JSON as keys, in TOML as comments with the options of the command.
@@ -128,9 +113,9 @@ fn with_taken(text: &str, given_up: &[GivenUp]) -> String {
 
 #[pymethods]
 impl Picture {
-    /// A picture of layers by name, each (height, width, 3) or (height, width), with the facts and the metadata of another.
+    /// A picture of layers by name, each (height, width, 3) or (height, width), with the facts, the metadata and the legends of another.
     #[staticmethod]
-    fn of_parts(layers: &Bound<'_, PyDict>, facts: String, metadata: &str) -> PyResult<Self> {
+    fn of_parts(layers: &Bound<'_, PyDict>, facts: String, metadata: &str, legends: Vec<Legend>) -> PyResult<Self> {
         let broken = |error: &dyn std::fmt::Display| refused("the picture", "its metadata as JSON", &error.to_string());
         let metadata: Value = serde_json::from_str(metadata).map_err(|error| broken(&error))?;
         let mut made = Layers::default();
@@ -185,7 +170,7 @@ impl Picture {
             },
             facts,
             has_background: metadata["has_background"].as_bool().unwrap_or_default(),
-            scales: None,
+            scales: legends.into_iter().map(Legend::scale).collect::<PyResult<_>>()?,
         })
     }
 
@@ -241,6 +226,12 @@ impl Picture {
     #[getter]
     fn facts(&self) -> &str {
         &self.facts
+    }
+
+    /// What its colours stand for, for [`Self::of_parts`].
+    #[getter]
+    fn legends(&self) -> Vec<Legend> {
+        self.scales.iter().map(Legend::new).collect()
     }
 
     /// What is displayed, bytes of sRGB: (height, width, 3), or 4 channels where it is transparent.

@@ -11,6 +11,8 @@ dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 
 SMALL = (32, 24)
+# Large enough for a legend.
+WITH_LEGEND = (320, 240)
 FRAMES = 4
 SETS = 8
 
@@ -67,8 +69,13 @@ def test_sets_have_the_same_mean_on_any_scheduler(cluster, tmp_path):
     assert np.array_equal(one.rgb, killed.rgb)
     other.save(tmp_path / "a.exr")
     assert (tmp_path / "a.exr").stat().st_size > 1000
-    with pytest.raises(og.InputError, match="from another process"):
-        other.save(tmp_path / "a.png", legend=True)
+
+
+def test_a_mean_of_sets_has_the_legends_of_its_scene(tmp_path):
+    picture = og.dask.sets(cloud(), 4, each=2, size=WITH_LEGEND).compute(scheduler="processes")
+    for name, legend in (("with", True), ("without", False)):
+        picture.save(tmp_path / f"{name}.png", legend=legend)
+    assert (tmp_path / "with.png").read_bytes() != (tmp_path / "without.png").read_bytes()
 
 
 def test_the_standard_error_of_sets_is_that_of_their_mean():

@@ -67,7 +67,7 @@ def test_pictures_come_back_from_other_processes():
         assert one.camera == other.camera and one.layers == other.layers
 
 
-def test_a_pickled_picture_is_the_same_but_for_its_legend(tmp_path):
+def test_a_pickled_picture_is_the_same(tmp_path):
     scene = og.Scene()
     scene.add_points(np.random.default_rng(0).normal(size=(200, 3)), values=np.arange(200.0), radius=0.3)
     scene.set("render.layers", ["depth", "object", "effects"])
@@ -80,9 +80,42 @@ def test_a_pickled_picture_is_the_same_but_for_its_legend(tmp_path):
         picture.save(tmp_path / f"one-{name}", **options)
         again.save(tmp_path / f"two-{name}", **options)
         assert (tmp_path / f"one-{name}").read_bytes() == (tmp_path / f"two-{name}").read_bytes()
-    picture.save(tmp_path / "legend.png", legend=True)
-    with pytest.raises(og.InputError, match="legend: expected a picture that was drawn in this process"):
-        again.save(tmp_path / "legend.png", legend=True)
+
+
+def legend_scenes():
+    """A scene for each kind of colours that a legend tells of."""
+    places = np.random.default_rng(0).normal(size=(200, 3))
+    columns = {"class": np.arange(200) % 3, "heat": np.linspace(-3.0, 7.0, 200), "depth": np.geomspace(1e-3, 10.0, 200)}
+    shown = {
+        "map": {"color_by": "heat", "clim": (-2.5, 1.0 / 3.0)},
+        "logarithm": {"color_by": "depth", "log_scale": True},
+        "classes": {"color_by": {"column": "class", "map": "classes"}},
+        "distinct": {"color_by": {"column": "class", "map": "distinct"}},
+        "transfer": {"color_by": "heat", "transfer": og.transfer("turbo", clim=(-3.0, 7.0))},
+    }
+    for name, look in shown.items():
+        scene = og.Scene()
+        scene.add_points(places, columns=columns, radius=0.3, name=name, **look)
+        yield name, scene
+    regions = np.zeros((6, 6, 6), int)
+    regions[1:5, 1:5, 1:3], regions[1:5, 1:5, 3:5] = 1, 2
+    labels = og.Scene()
+    labels.add_labels(regions, labels={1: "liver", 2: {"name": "spleen", "color": "#ff8000", "opacity": 0.5}}, name="organs")
+    yield "labels", labels
+    yield "volume", fog()
+
+
+@pytest.mark.parametrize(("name", "scene"), legend_scenes(), ids=lambda part: part if isinstance(part, str) else "")
+def test_a_pickled_picture_has_its_legends(name, scene, tmp_path):
+    picture = og.render(scene, size=(320, 240))
+    again = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(picture))))
+    for place in ("over", "beside"):
+        for number, each in enumerate((picture, again)):
+            each.save(tmp_path / f"{number}.png", legend=place)
+        assert (tmp_path / "0.png").read_bytes() == (tmp_path / "1.png").read_bytes()
+    picture.save(tmp_path / "without.png")
+    picture.save(tmp_path / "over.png", legend=True)
+    assert (tmp_path / "without.png").read_bytes() != (tmp_path / "over.png").read_bytes()
 
 
 def test_progress_is_a_function_a_bar_or_lines(capsys, monkeypatch):

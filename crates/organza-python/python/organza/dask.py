@@ -179,6 +179,8 @@ class _Mean:
     squares: Any
     facts: dict[str, Any]
     metadata: dict[str, Any]
+    # What colours stand for, which is the same in all sets.
+    legends: list[dict[str, Any]]
     remarks: list[str]
     left_out: list[str] = field(default_factory=list)
 
@@ -202,7 +204,7 @@ def _set(
     # A scene may state an error to reach, by which a task draws another number of sets.
     sets_drawn = metadata["sets"] or drawn
     squares = np.zeros(layers["alpha"].shape)
-    return _Mean(sets_drawn, 1, layers, squares, json.loads(picture.facts), metadata, scene.notes, left_out)
+    return _Mean(sets_drawn, 1, layers, squares, json.loads(picture.facts), metadata, picture.legends, scene.notes, left_out)
 
 
 def _merge(means: list[_Mean]) -> _Mean:
@@ -224,7 +226,7 @@ def _merged(first: _Mean, second: _Mean) -> _Mean:
     cost = [one | {"seconds": one["seconds"] + other["seconds"]} for one, other in stages]
     facts = first.facts | {"warnings": first.facts["warnings"] + warnings, "cost": cost}
     tasks = first.tasks + second.tasks
-    return _Mean(total, tasks, layers, squares, facts, first.metadata, first.remarks, first.left_out)
+    return _Mean(total, tasks, layers, squares, facts, first.metadata, first.legends, first.remarks, first.left_out)
 
 
 def _finish(mean: _Mean) -> Picture:
@@ -236,7 +238,7 @@ def _finish(mean: _Mean) -> Picture:
     if mean.left_out:
         notes.append(f"layers that have no mean over sets are left out: {', '.join(mean.left_out)}")
     facts = json.dumps(mean.facts | {"notes": notes})
-    drawn = _organza.Picture.of_parts(layers, facts, json.dumps(mean.metadata | {"sets": mean.sets}))
+    drawn = _organza.Picture.of_parts(layers, facts, json.dumps(mean.metadata | {"sets": mean.sets}), mean.legends)
     return Picture(drawn, mean.remarks)
 
 

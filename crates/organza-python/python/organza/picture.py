@@ -19,7 +19,7 @@ class Picture:
 
     ``picture.rgb`` is what is seen, ``picture["depth.median"]`` another layer, if the scene's ``render.layers`` asks for it. A notebook shows it.
 
-    A picture can be pickled with its layers; its legends stay in the process that drew it.
+    A picture can be pickled, with its layers and its legends.
     """
 
     def __init__(self, drawn: _organza.Picture, remarks: list[str]):
@@ -153,12 +153,12 @@ class Picture:
             warnings.warn(sentence, stacklevel=2)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Layers and facts; the legends of colours stay in the process that drew it."""
-        layers = {name: self._drawn.layer(name) for name in self.layers}
-        return {"layers": layers, "facts": self._drawn.facts, "metadata": self._drawn.metadata, "remarks": self._remarks}
+        drawn = self._drawn
+        layers = {name: drawn.layer(name) for name in self.layers}
+        return {"layers": layers, "facts": drawn.facts, "metadata": drawn.metadata, "legends": drawn.legends, "remarks": self._remarks}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        drawn = _organza.Picture.of_parts(state["layers"], state["facts"], state["metadata"])
+        drawn = _organza.Picture.of_parts(state["layers"], state["facts"], state["metadata"], state["legends"])
         self.__init__(drawn, state["remarks"])  # type: ignore[misc]
 
     def _repr_png_(self) -> bytes:
