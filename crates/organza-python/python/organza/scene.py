@@ -19,6 +19,7 @@ from organza.arrays import array_of, color_of, colors_of, columns_of, halved_qua
 from organza.checking import check_keys, meant, of_object
 from organza.fields import Field, field_of
 from organza.lattices import check_level, check_plane, lattice_of, percentiles, volume_arguments
+from organza.paths import path_in
 from organza.placing import Camera, Light, beyond
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
@@ -642,13 +643,16 @@ class Scene:
 
     def set(self, key: str, value: Any) -> None:
         """Sets a key of docs/scene.md, such as ``scene.set("render.technique", "surfels")`` or ``scene.set("object.scan.opacity", 0.5)``; objects and lights
-        are named, materials too."""
+        are named, materials too. A name with dots may stand in quotes, ``scene.set('object."scan.v2".opacity', 0.5)``, and has to where another name is its
+        beginning."""
         self._check_open()
-        parts = key.split(".")
-        if parts[-1] == "color":
-            value = color_of(value, key)
+        if not isinstance(key, str):
+            raise InputError(f"key: expected a text, such as 'render.technique', found {_kind(key)}")
+        parts = path_in(self._document, key)
         if not all(parts) or value is None:
             raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
+        if parts[-1] == "color":
+            value = color_of(value, key)
         # What is refused changes nothing.
         changed = copy.deepcopy(self._document)
         place: Any = changed

@@ -21,8 +21,14 @@ pub struct Override {
 }
 
 impl Override {
-    /// From `PATH=VALUE`: keys with dots between them, in a list an index from 0 or an entry's `name`; the value in
-    /// TOML, where a plain word needs no quotes. Without a value, what is at the path is taken away.
+    /// From `PATH=VALUE`: keys with dots between them, in a list an index from 0 or an entry's `name`; a key with dots stands in quotes, as in TOML. The
+    /// value is in TOML, where a plain word needs no quotes. Without a value, what is at the path is taken away.
+    ///
+    /// ```
+    /// use organza_scene::Override;
+    /// let change = Override::parse("object.\"scan.v2\".opacity=0.5").unwrap();
+    /// assert_eq!(change.path(), ["object", "scan.v2", "opacity"]);
+    /// ```
     ///
     /// # Errors
     /// [`Error::Usage`] naming what is wrong.
@@ -31,7 +37,7 @@ impl Override {
             let message = format!("--set {}: {message}", shown(text));
             Error::usage(message, "write PATH=VALUE, such as --set render.points.exact=true")
         };
-        let (path, value) = text.split_once('=').ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
+        let (path, value) = split_assignment(text).ok_or_else(|| bad("expected PATH=VALUE, found no `=`".into()))?;
         let path = split_path(path).map_err(bad)?;
         let value = value.trim();
         if value.is_empty() {
@@ -164,13 +170,63 @@ fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007f")
 }
 
-/// Keys with dots between them; the error is a message alone.
+/// Keys with dots between them, each plain or in the quotes of TOML; the error is a message alone.
 pub(crate) fn split_path(text: &str) -> Result<Vec<String>, String> {
-    let path: Vec<String> = text.trim().split('.').map(str::to_owned).collect();
+    let mut path = Vec::new();
+    let mut rest = Some(text.trim());
+    while let Some(from) = rest {
+        let (key, after) = first_key(from)?;
+        path.push(key);
+        rest = after;
+    }
     if path.iter().any(String::is_empty) || path.len() > MAX_SCENE_DEPTH {
         return Err(format!("expected 1 to {MAX_SCENE_DEPTH} keys with dots between them"));
     }
     Ok(path)
+}
+
+/// The first key of a path, and what follows the dot behind it.
+fn first_key(path: &str) -> Result<(String, Option<&str>), String> {
+    if !path.starts_with(QUOTES) {
+        return Ok(path.split_once('.').map_or((path.to_owned(), None), |(key, after)| (key.to_owned(), Some(after))));
+    }
+    let open = || format!("expected a key in quotes with a dot or nothing behind it, found {}", shown(path));
+    let end = quotes_end(path).ok_or_else(open)?;
+    let Value::Text(key) = read_toml_value(&path[..end])? else { return Err(open()) };
+    match path[end..].strip_prefix('.') {
+        None if end < path.len() => Err(open()),
+        after => Ok((key, after)),
+    }
+}
+
+/// The quotes that keys may stand in.
+const QUOTES: [char; 2] = ['"', '\''];
+
+/// The byte behind the quotes that a text begins with; `None` where they do not end.
+fn quotes_end(text: &str) -> Option<usize> {
+    let quote = text.chars().next()?;
+    let mut is_escaped = false;
+    let ends = |(_, c): &(usize, char)| {
+        let is_end = *c == quote && !is_escaped;
+        is_escaped = quote == '"' && *c == '\\' && !is_escaped;
+        is_end
+    };
+    text.char_indices().skip(1).find(ends).map(|(at, c)| at + c.len_utf8())
+}
+
+/// The path and the value of `PATH=VALUE`, whose keys in quotes may hold the sign.
+fn split_assignment(text: &str) -> Option<(&str, &str)> {
+    let mut at = text.len() - text.trim_start().len();
+    loop {
+        if text[at..].starts_with(QUOTES) {
+            at += quotes_end(&text[at..])?;
+        }
+        at += text[at..].find(['.', '='])?;
+        if text[at..].starts_with('=') {
+            return Some((&text[..at], &text[at + 1..]));
+        }
+        at += 1;
+    }
 }
 
 fn is_not_finite(word: &str) -> bool {
@@ -302,4 +358,32 @@ fn name_of(node: &Node) -> Option<&str> {
         Value::Text(name) => Some(name.as_str()),
         _ => None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> (Vec<String>, Option<String>) {
+        let change = Override::parse(text).expect("a path and a value");
+        (change.path().to_vec(), change.toml())
+    }
+
+    #[test]
+    fn names_with_dots_stand_in_quotes() {
+        for (text, path) in [
+            ("object.\"a.b\".opacity=0.5", ["object", "a.b", "opacity"]),
+            ("object.'a=b'.opacity=0.5", ["object", "a=b", "opacity"]),
+            (" \"object\".\"a\\\".b\".opacity = 0.5", ["object", "a\".b", "opacity"]),
+            // A quote within a plain key is a letter.
+            ("object.it's.opacity=0.5", ["object", "it's", "opacity"]),
+        ] {
+            assert_eq!(parsed(text), (path.map(str::to_owned).to_vec(), Some("0.5".to_owned())), "{text}");
+        }
+        assert_eq!(parsed("render.effects.\"shadow.sun\"=").1, None);
+        for text in ["object.\"a.opacity=0.5", "object.\"a\"b.opacity=0.5", "object.\"\".opacity=0.5", "object.\"a\"."]
+        {
+            assert!(Override::parse(text).is_err(), "{text}");
+        }
+    }
 }
