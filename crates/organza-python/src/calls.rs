@@ -6,7 +6,7 @@ use crate::picture::Picture;
 use crate::running::run;
 use crate::wording::{self, MADE, placed};
 use convert::ColorMap;
-use organza::scene::{self, LoadOptions, Override, Scene, UpAxis, parse};
+use organza::scene::{self, Goal, LoadOptions, Override, Scene, UpAxis, parse};
 use organza::{Context, Error, Files, InMemory, Progress, RenderOptions};
 use organza_survey::{DataFile, Preset, Wish};
 use pyo3::prelude::*;
@@ -151,6 +151,20 @@ pub(crate) fn render(py: Python<'_>, mut given: Given, how: How<'_>, is_within_g
         Ok(Picture::new(&scene, &given.text, picture))
     };
     run(py, how.threads, how.progress.as_ref(), work)
+}
+
+/// The keys of a time or an error to keep to that a scene states, such as `render.budget_ms`.
+#[pyfunction]
+pub(crate) fn goal_keys(py: Python<'_>, mut given: Given, how: How<'_>) -> PyResult<Vec<String>> {
+    let options = how.options();
+    let in_memory = given.take_memory()?;
+    let work = move |_: &Progress| {
+        let Goal { budget_ms, max_rmse, max_flip } = given.scene(in_memory, &options)?.render.goal;
+        let is_stated = [budget_ms.is_some(), max_rmse.is_some(), max_flip.is_some()];
+        let stated = Goal::KEYS.into_iter().zip(is_stated).filter(|(_, is_stated)| *is_stated);
+        Ok(stated.map(|(key, _)| format!("render.{key}")).collect())
+    };
+    run(py, how.threads, None, work)
 }
 
 /// The lights of a first scene for what a scene without lights shows, a document in JSON.

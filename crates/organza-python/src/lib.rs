@@ -24,7 +24,8 @@ mod wording;
 mod organza_module {
     #[pymodule_export]
     use crate::calls::{
-        check, check_keys, first_scene, ground_of, in_words, lights_of, map_colors, render, schema, toml_text,
+        check, check_keys, first_scene, goal_keys, ground_of, in_words, lights_of, map_colors, render, schema,
+        toml_text,
     };
     #[pymodule_export]
     use crate::data::Data;

@@ -1,9 +1,12 @@
-"""What arguments may be: names with dots."""
+"""What arguments may be: names with dots, times to keep to."""
+
+import warnings
 
 import numpy as np
 import organza as og
 import pytest
 
+SMALL = (32, 24)
 PLACES = np.random.default_rng(0).normal(size=(40, 3))
 
 
@@ -44,3 +47,20 @@ def test_names_of_which_one_begins_another_are_told_apart_by_quotes():
     for path, said in [('object."a.opacity', "a key in quotes"), ('object."a"b.opacity', "a key in quotes"), ('object."a.b"', "its name alone"), ('object."c".opacity', "expected one of a, a.b, found 'c'")]:
         with pytest.raises(og.InputError, match=said):
             scene.set(path, 0.5)
+
+
+def test_a_time_to_keep_to_is_told_where_it_has_no_part():
+    scene = points()
+    scene.set("render.budget_ms", 5000)
+    scene.set("render.max_rmse", 0.5)
+    with pytest.warns(UserWarning, match=r"render.budget_ms has no part in organza.explain"):
+        document = og.explain(scene, size=SMALL)
+    assert [said.split(" ")[0] for said in document["warnings"] if "has no part" in said] == ["render.budget_ms", "render.max_rmse"]
+    with pytest.warns(UserWarning, match=r"render.budget_ms has no part in organza.view"):
+        og.view(scene, size=SMALL).close()
+    for call in (og.explain, og.view, og.turntable, og.accuracy, og.orders):
+        with pytest.raises(TypeError, match="found `budget_ms`; one picture of organza.render keeps to it"):
+            call(PLACES, budget_ms=100)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        og.explain(points(), size=SMALL)

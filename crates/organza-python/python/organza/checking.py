@@ -28,6 +28,9 @@ _INSTEAD = {
 }
 # What takes the place of a width or a height.
 _SIZE = "; `size=(width, height)` takes both"
+# Arguments of one picture alone, and what takes them.
+_GOAL_KEYS = ("budget_ms", "max_rmse", "max_flip")
+_GOAL = "; one picture of organza.render keeps to it"
 # Likeness from which another name is meant, of 1.
 _LIKE = 0.6
 
@@ -115,6 +118,7 @@ def named(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result
                 # A call of the camera itself is that of `camera`.
                 called = "camera" if call.__name__ == "__call__" else call.__name__
                 question = _SIZE if name in ("width", "height") and "size" in known else meant(name, known) or f"; they are {', '.join(known)}"
+                question = _GOAL if name in _GOAL_KEYS else question
                 raise TypeError(f"{called}: expected one of its arguments, found `{name}`{question}")
         return call(*values, **keywords)
 

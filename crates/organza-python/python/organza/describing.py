@@ -12,7 +12,7 @@ from typing import Any
 from organza import _organza
 from organza._organza import InputError
 from organza.checking import named
-from organza.drawing import _how, _wished
+from organza.drawing import _how, _wished, unused_goal, warn
 from organza.progressing import Progress, heard
 from organza.scene import Scene, _is_scene, scene_of
 
@@ -106,7 +106,11 @@ def explain(
     with heard(progress) as told:
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
-        document = _dict(_organza.explain(scene._given(how, effects, size), measure, how))
+        given = scene._given(how, effects, size)
+        document = _dict(_organza.explain(given, measure, how))
+    unused = unused_goal(given, how, "organza.explain, which tells of the scene's own settings")
+    document["warnings"] += unused
+    warn(unused)
     paths = [os.fspath(thing) for thing in what if isinstance(thing, (str, os.PathLike))]
     document["scene"] = paths[0] if paths else None
     return document
@@ -167,7 +171,10 @@ def accuracy(
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
         effort = {"quick": quick, "finer": finer, "folder": made, "force": force}
-        return _dict(_organza.judge_accuracy(scene._given(how, effects, size), effort, how))
+        given = scene._given(how, effects, size)
+        report = _dict(_organza.judge_accuracy(given, effort, how))
+    warn(unused_goal(given, how, "organza.accuracy, which measures the scene's own settings"))
+    return report
 
 
 @named
@@ -209,7 +216,10 @@ def orders(
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
         effort = {"quick": quick, "finer": 0, "folder": made, "force": force}
-        return _dict(_organza.judge_orders(scene._given(how, effects, size), effort, how))
+        given = scene._given(how, effects, size)
+        report = _dict(_organza.judge_orders(given, effort, how))
+    warn(unused_goal(given, how, "organza.orders, which measures the scene's own settings"))
+    return report
 
 
 def _dict(document: str) -> dict[str, Any]:

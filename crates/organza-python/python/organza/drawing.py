@@ -95,9 +95,7 @@ def render(
         given = scene._given(how, effects, size, transparent)
         given["changes"] = _goal({"budget_ms": budget_ms, "max_rmse": max_rmse, "max_flip": max_flip})
         picture = Picture(_organza.render(given, how, True), scene.notes)
-    for sentence in picture.warnings:
-        # Of the caller, beyond the check of names.
-        warnings.warn(sentence, stacklevel=3)
+    warn(picture.warnings)
     return picture
 
 
@@ -176,6 +174,19 @@ def _frame(
         how = how | {"progress": told}
         given = scene._given(how, effects, size, transparent, turntable=frames) | {"frame": frame}
         return Picture(_organza.render(given, how), scene.notes)
+
+
+def unused_goal(given: dict[str, Any], how: dict[str, Any], place: str) -> list[str]:
+    """Sentences about the keys of a time or an error to keep to, in a place that keeps to none."""
+    keys = _organza.goal_keys(given, how | {"progress": None})
+    return [f"{key} has no part in {place}: one picture of organza.render keeps to it" for key in keys]
+
+
+def warn(sentences: list[str]) -> None:
+    """Warns the caller of a function of the package."""
+    for sentence in sentences:
+        # Beyond the check of names.
+        warnings.warn(sentence, stacklevel=4)
 
 
 def _goal(stated: Mapping[str, Any]) -> list[str]:

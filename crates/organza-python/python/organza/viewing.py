@@ -9,7 +9,7 @@ from typing import Any
 
 from organza import _organza
 from organza.checking import named
-from organza.drawing import _how, _wished
+from organza.drawing import _how, _wished, unused_goal, warn
 from organza.progressing import heard
 from organza.scene import scene_of
 
@@ -100,5 +100,6 @@ def view(
     title = ", ".join(paths) or "scene"
     with heard(progress) as told:
         how = _how(None, max_memory, told, drop_invalid, strict)
-        scene = scene_of(what, wished, how)
-        return View(_organza.view(scene._given(how, effects, size), title, how), height)
+        given = scene_of(what, wished, how)._given(how, effects, size)
+        warn(unused_goal(given, how, "organza.view"))
+        return View(_organza.view(given, title, how), height)
