@@ -339,7 +339,8 @@ pub(crate) fn in_words(sentence: &str) -> String {
 pub(crate) fn map_colors(name: &str, places: Vec<f64>) -> PyResult<Vec<[f32; 3]>> {
     let Some(map) = ColorMap::named(name) else {
         let known: Vec<&str> = ColorMap::names().collect();
-        return Err(refused("colormap", &format!("one of {}", known.join(", ")), &format!("'{name}'")));
+        let found = format!("'{name}'; a colormap of matplotlib does, too");
+        return Err(refused("colormap", &format!("one of {}", known.join(", ")), &found));
     };
     Ok(places.into_iter().map(|place| map.at(place)).collect())
 }

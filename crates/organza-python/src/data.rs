@@ -125,8 +125,9 @@ impl Data {
         let mut named = Vec::new();
         for (name, array) in columns.into_iter().flatten() {
             let name: String = name.extract()?;
-            arrays::check_rows(&name, &array, Some(count), 1)?;
-            let values = arrays::column(&name, &array, |value| value)?;
+            let shown = column_name(&name);
+            arrays::check_rows(&shown, &array, Some(count), 1)?;
+            let values = arrays::column(&shown, &array, |value| value)?;
             named.push(Column { name, values });
         }
         let points = RawPoints {
@@ -384,11 +385,17 @@ fn mesh_columns(
     let mut named = Vec::new();
     for (name, array) in columns.into_iter().flatten() {
         let name: String = name.extract()?;
-        arrays::check_rows(&name, &array, Some(count), 1)?;
-        let values = arrays::column(&name, &array, |value| value)?;
+        let shown = column_name(&name);
+        arrays::check_rows(&shown, &array, Some(count), 1)?;
+        let values = arrays::column(&shown, &array, |value| value)?;
         named.push(MeshColumn { name, association, values });
     }
     Ok(named)
+}
+
+/// A column in messages, by the argument that has it.
+fn column_name(name: &str) -> String {
+    format!("columns, '{name}'")
 }
 
 /// One number a row; none stays none.

@@ -25,6 +25,7 @@ pyo3::create_exception!(
 pub(crate) fn raised(error: &Error) -> PyErr {
     let message = sentence(&error.to_string());
     let hint = sentence(error.hint());
+    let hint = if is_of_memory(error) && !hint.contains(MEMORY) { with_memory(&hint) } else { hint };
     let text = if hint.is_empty() { message } else { format!("{message}\nhint: {hint}") };
     match error {
         Error::Cancelled => PyKeyboardInterrupt::new_err(()),
@@ -38,6 +39,20 @@ pub(crate) fn raised(error: &Error) -> PyErr {
             _ => InputError::new_err(text),
         },
     }
+}
+
+/// The argument that limits memory.
+const MEMORY: &str = "`max_memory`";
+
+/// Whether an error is that of a limit of bytes, which follows from `max_memory`.
+fn is_of_memory(error: &Error) -> bool {
+    matches!(error, Error::Limit(exceeded) if exceeded.unit == "bytes" && exceeded.limit.is_some())
+}
+
+/// A hint that names the argument, too.
+fn with_memory(hint: &str) -> String {
+    let larger = format!("a larger {MEMORY}");
+    if hint.is_empty() { format!("draw with {larger}") } else { format!("{hint}, or {larger}") }
 }
 
 /// An argument that is wrong.

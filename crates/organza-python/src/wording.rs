@@ -12,7 +12,7 @@ pub(crate) const MADE: &str = "scene.json";
 const MARK: &str = "memory:";
 
 /// Words of a command line, and those of Python; longer ones come before those that they contain.
-const WORDS: [(&str, &str); 59] = [
+const WORDS: [(&str, &str); 62] = [
     ("move or strengthen a [[light]], or add [ambient]", "move or strengthen a light, or set ambient.color"),
     (
         "add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \"unlit\"",
@@ -42,6 +42,15 @@ const WORDS: [(&str, &str); 59] = [
         "`mesh = ` draws the surface of each, `volume = ` takes them for amounts",
         "`scene.add_labels` draws the surface of each, `scene.add_volume` takes them for amounts",
     ),
+    (
+        "name the volume by `mesh`, which draws the surface of each label",
+        "`scene.add_labels` draws the surface of each label",
+    ),
+    (
+        "or give the object a `transfer` with colours of its own",
+        "a colormap of matplotlib, or a list of colours, does too",
+    ),
+    ("name a volume of labels by `mesh`", "`scene.add_labels` takes a volume of labels"),
     (" in the [[object]] draws nothing there", " as a key of the object draws nothing there"),
     ("`[ambient]` stands for it", "ambient.color stands for it"),
     (

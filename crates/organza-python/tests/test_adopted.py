@@ -163,3 +163,22 @@ def test_data_of_open3d_by_its_names():
     scene = og.Scene()
     scene.add(mesh)
     assert scene.notes == ["mesh: not used: textures, triangle_uvs"]
+
+
+def test_what_is_no_volume_is_named():
+    sitk = pytest.importorskip("SimpleITK")
+    for image, said in [(sitk.Image(4, 4, sitk.sitkFloat32), "2 axes and 1 numbers"), (sitk.Image([4, 4, 4], sitk.sitkVectorFloat32, 3), "3 axes and 3 numbers")]:
+        with pytest.raises(og.InputError, match=f"the image: expected three axes and one number a voxel, found {said}"):
+            og.Scene().add(image)
+    xr = pytest.importorskip("xarray")
+    times = np.arange(4).astype("datetime64[D]")
+    with pytest.raises(og.InputError, match=r"the coordinate time: expected numbers, .*datetime64\[.*\]; `drop_vars\('time'\)`"):
+        og.Scene().add(xr.DataArray(np.zeros((4, 3, 3)), dims=("time", "a", "b"), coords={"time": times}))
+    with pytest.raises(og.InputError, match="the array: expected one, found a list of 2"):
+        og.render([np.eye(3), np.eye(3)])
+
+
+def test_lines_of_trimesh_are_named():
+    trimesh = pytest.importorskip("trimesh")
+    with pytest.raises(og.InputError, match="found trimesh.Path3D: lines are not drawn; its `vertices` are points"):
+        og.Scene().add(trimesh.load_path(np.eye(3)))

@@ -214,7 +214,7 @@ REFUSED = {
     "two channels": ({"uv": np.zeros((6, 2)), "texture": np.zeros((4, 4, 2))}, r"\(height, width, 3\)"),
     "an image of nothing": ({"uv": np.zeros((6, 2)), "texture": np.zeros((0, 4, 3))}, "pixels a side"),
     "a dark image": ({"uv": np.zeros((6, 2)), "texture": np.full((1, 1, 3), -1.0)}, "finite colours from 0 on"),
-    "values of another count": ({"values": np.zeros(5)}, r"value: expected the shape \(6,\)"),
+    "values of another count": ({"values": np.zeros(5)}, r"values: expected the shape \(6,\) of vertices or \(2,\) of faces, found \(5,\)"),
     "opacities beyond 1": ({"opacities": np.full(6, 2.0)}, "opacity"),
     "a map alone": ({"colormap": "turbo"}, "expected a column to colour by"),
 }

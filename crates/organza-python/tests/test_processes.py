@@ -87,11 +87,11 @@ def legend_scenes():
     places = np.random.default_rng(0).normal(size=(200, 3))
     columns = {"class": np.arange(200) % 3, "heat": np.linspace(-3.0, 7.0, 200), "depth": np.geomspace(1e-3, 10.0, 200)}
     shown = {
-        "map": {"color_by": "heat", "clim": (-2.5, 1.0 / 3.0)},
+        "map": {"color_by": "heat", "clim": (None, 1.0 / 3.0)},
         "logarithm": {"color_by": "depth", "log_scale": True},
         "classes": {"color_by": {"column": "class", "map": "classes"}},
         "distinct": {"color_by": {"column": "class", "map": "distinct"}},
-        "transfer": {"color_by": "heat", "transfer": og.transfer("turbo", clim=(-3.0, 7.0))},
+        "transfer": {"color_by": "heat", "colormap": ["#ff0000", "#00ff00", "#0000ff"]},
     }
     for name, look in shown.items():
         scene = og.Scene()

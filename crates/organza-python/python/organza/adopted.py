@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from organza._organza import Data, InputError
+from organza.arrays import array_of
 from organza.transfers import transfer
+from organza.values import kind_of
 
 if TYPE_CHECKING:
     from organza.scene import Scene
 
 # What trimesh takes as the diffuse colour of a material that states none.
 _NO_DIFFUSE = [102, 102, 102, 255]
+# Kinds of data sets in messages.
+_IN_WORDS = {"mesh": "a mesh", "points": "a set of points"}
 # Left and back to right and front.
 _HALF_TURN = np.array([-1.0, -1.0, 1.0])
 
@@ -53,18 +57,36 @@ def add(scene: Scene, thing: Any, name: str | None, keys: Mapping[str, Any]) -> 
         scene._remarks.append(f"{scene.objects[before]}: not used: {', '.join(unused)}")
 
 
-def volume_of(thing: Any) -> dict[str, Any]:
-    """The arguments of ``Scene.add_volume`` for an array or the volume of another library."""
-    for look in (_vtk, _nibabel, _simpleitk, _xarray):
+def volume_of(thing: Any, name: str) -> dict[str, Any]:
+    """The arguments of ``Scene.add_volume`` for an array or the volume of another library; ``name`` is the argument that it stands for."""
+    for look in (_vtk, _nibabel, _simpleitk, _xarray, _trimesh, _open3d):
         found = look(thing)
         if found is None:
             continue
         kind, _, arguments = found
         if kind != "volume":
-            raise InputError(f"values: expected a volume, found {kind}")
+            raise InputError(f"{name}: expected a volume, found {kind_of(thing)}, which is {_IN_WORDS[kind]}; scene.add(x) takes it")
         arguments.pop("unused", None)
         return arguments
     return {"values": thing}
+
+
+def check_array(name: str, thing: Any) -> None:
+    """Refuses a data set of another library in the place of an array, with the call that takes it."""
+    if _is_data_set(thing):
+        raise InputError(f"{name}: expected an array, found {kind_of(thing)}; scene.add(x) takes it")
+
+
+def _is_data_set(thing: Any) -> bool:
+    """Whether a thing is a data set of a library, and no array of it."""
+    if isinstance(thing, (np.ndarray, list, tuple)):
+        return False
+    module = type(thing).__module__.partition(".")[0]
+    is_of_vtk = hasattr(thing, "GetClassName") and hasattr(thing, "GetNumberOfPoints")
+    is_of_trimesh = module == "trimesh" and (hasattr(thing, "vertices") or hasattr(thing, "geometry"))
+    is_of_open3d = module == "open3d" and (hasattr(thing, "points") or hasattr(thing, "triangles"))
+    is_image = (hasattr(thing, "affine") and hasattr(thing, "dataobj")) or (module == "SimpleITK" and hasattr(thing, "GetSpacing"))
+    return is_of_vtk or is_of_trimesh or is_of_open3d or is_image or (module == "xarray" and hasattr(thing, "data_vars"))
 
 
 def data_of(thing: Any) -> Adopted:
@@ -76,7 +98,8 @@ def data_of(thing: Any) -> Adopted:
     # What a first scene decides of points; of a mesh it shows a column if that is asked for.
     color_by = arguments.pop("color_by", None)
     if kind == "volume":
-        arguments["transfer"] = transfer()
+        # It is not drawn by this, and its values tell no ends.
+        arguments["transfer"] = transfer(clim=(0.0, 1.0))
     scene = Scene()
     unused = list(arguments.pop("unused", []))
     if "uv" in arguments and "texture" not in arguments:
@@ -94,8 +117,9 @@ def _arguments(thing: Any) -> tuple[str, str, dict[str, Any]]:
         if found is not None:
             return found
     kind = f"{type(thing).__module__}.{type(thing).__qualname__}"
+    instead = "; Scene.add_points takes positions, and the others by `columns`" if isinstance(thing, Mapping) else ""
     raise InputError(
-        f"expected a file, a scene, an array, or a data set of PyVista, VTK, trimesh, Open3D, xarray, nibabel or SimpleITK, found {kind}"
+        f"expected a file, a scene, an array, or a data set of PyVista, VTK, trimesh, Open3D, xarray, nibabel or SimpleITK, found {kind}{instead}"
     )
 
 
@@ -204,6 +228,8 @@ def _trimesh(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
             return "mesh", "mesh", mesh | textured
         seen = visual.to_color() if visual.kind == "texture" else visual
         return "mesh", "mesh", mesh | {"colors": np.asarray(seen.vertex_colors)[:, :3]}
+    if hasattr(thing, "entities"):
+        raise InputError(f"expected a mesh or points, found {kind_of(thing)}: lines are not drawn; its `vertices` are points")
     if hasattr(thing, "vertices"):
         colors = np.asarray(getattr(thing, "colors", np.empty(0)))
         known = colors[:, :3] if colors.ndim == 2 and len(colors) == len(thing.vertices) else None
@@ -281,6 +307,9 @@ def _simpleitk(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     library = sys.modules.get("SimpleITK")
     if library is None or not isinstance(thing, library.Image):
         return None
+    if thing.GetDimension() != 3 or thing.GetNumberOfComponentsPerPixel() != 1:
+        found = f"{thing.GetDimension()} axes and {thing.GetNumberOfComponentsPerPixel()} numbers a voxel"
+        raise InputError(f"the image: expected three axes and one number a voxel, found {found}; take one of a series, or one channel")
     arguments = {
         "values": library.GetArrayViewFromImage(thing),
         "spacing": thing.GetSpacing(),
@@ -322,7 +351,7 @@ def _xarray(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     thing = _in_order(thing)
     spacing, origin = [], []
     for dim in reversed(thing.dims):
-        places = np.asarray(thing.coords[dim].values, dtype=float) if dim in thing.coords else np.arange(float(thing.sizes[dim]))
+        places = _places_along(thing, dim)
         steps = np.diff(places)
         if len(steps) and not np.allclose(steps, steps[0], rtol=1e-3):
             raise InputError(f"the coordinate {dim}: expected even steps, found {steps.min()} to {steps.max()}; interpolate it first")
@@ -331,11 +360,23 @@ def _xarray(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     return "volume", str(thing.name or "volume"), {"values": thing.values, "spacing": spacing, "origin": origin}
 
 
+def _places_along(thing: Any, dim: Any) -> np.ndarray:
+    """The coordinates of an array of xarray along a dimension; counted where it has none."""
+    if dim not in thing.coords:
+        return np.arange(float(thing.sizes[dim]))
+    places = np.asarray(thing.coords[dim].values)
+    if places.dtype.kind not in "biuf":
+        raise InputError(f"the coordinate {dim}: expected numbers, found those of type {places.dtype}; `drop_vars({str(dim)!r})` leaves steps of 1")
+    return places.astype(float)
+
+
 def _array(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     """An array: n rows of three numbers are points, three axes a volume."""
     if not hasattr(thing, "__array__") and not isinstance(thing, (list, tuple)):
         return None
-    array = np.asarray(thing)
+    if isinstance(thing, (list, tuple)) and thing and all(isinstance(part, np.ndarray) and part.ndim == 2 and part.shape[1] == 3 for part in thing):
+        raise InputError(f"the array: expected one, found a list of {len(thing)} with rows of three numbers; organza.render(*arrays) takes several, Scene.add each of them")
+    array = array_of(thing, "the array")
     if array.ndim == 3:
         return "volume", "volume", {"values": array}
     if array.ndim == 2 and array.shape[1] == 3:

@@ -6,23 +6,29 @@ import difflib
 import functools
 import inspect
 import json
+import reprlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
 from organza import _organza
 from organza._organza import InputError
+from organza.values import text
 
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 
 # Words of other libraries that resemble no argument of this one.
-_KNOWN_ELSEWHERE = {"alpha": "opacity", "vmin": "clim", "vmax": "clim", "c": "colors", "scalars": "values", "norm": "log_scale", "size": "radius", "pos": "position"}
+_KNOWN_ELSEWHERE = {"alpha": "opacity", "vmin": "clim", "vmax": "clim", "c": "colors", "scalars": "values", "norm": "log_scale", "size": "radius", "pos": "position", "map": "colormap"}
 # Arguments of which no key of an object is near, by the words that users have for them.
 _INSTEAD = {
     "add_volume": {
-        "colormap": "`transfer=og.transfer({value!r})` takes a map",
-        "cmap": "`transfer=og.transfer({value!r})` takes a map",
-        "clim": "`transfer=og.transfer(clim={value!r})` takes the ends of the map",
+        "colormap": "`transfer=og.transfer({value})` takes a map",
+        "cmap": "`transfer=og.transfer({value})` takes a map",
+        "map": "`transfer=og.transfer({value})` takes a map",
+        "clim": "`transfer=og.transfer(clim={value})` takes the ends of the map",
+        "vmin": "`transfer=og.transfer(clim=({value}, None))` takes the ends of the map",
+        "vmax": "`transfer=og.transfer(clim=(None, {value}))` takes the ends of the map",
+        "window": "`transfer=og.transfer(clim=(level - window / 2, level + window / 2))` takes the ends of the map",
     },
     "": {"point_size": "`radius` takes a number, in the unit of the positions"},
 }
@@ -70,7 +76,8 @@ def check_keys(call: Callable[..., Any], label: str, keys: Mapping[str, Any]) ->
         if instead is None and not isinstance(keys[key], Mapping):
             instead = _INSTEAD[""].get(key)
         if instead is not None:
-            raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`; {instead.format(value=keys[key])}")
+            value = reprlib.repr(keys[key])
+            raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`; {instead.format(value=value)}")
         if key not in object_keys():
             raise InputError(f"{call.__name__}, '{label}': expected an argument or a key of an object, found `{key}`{meant(key, known - {key})}")
 
@@ -96,11 +103,11 @@ def of_object(call: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Re
 
     @functools.wraps(call)
     def checked(*values: _Parameters.args, **keywords: _Parameters.kwargs) -> _Result:
+        name = text("name", keywords.get("name"), "a text")
         try:
             return call(*values, **keywords)
         except InputError as error:
-            name = keywords.get("name")
-            if not isinstance(name, str) or f"'{name}" in str(error):
+            if name is None or f"'{name}" in str(error):
                 raise
             raise InputError(f"object '{name}', {error}") from None
 

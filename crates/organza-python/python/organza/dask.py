@@ -27,9 +27,10 @@ except ImportError:
 from organza import _organza
 from organza._organza import InputError
 from organza.checking import named
-from organza.drawing import _frame, _how, _whole, _wished
+from organza.drawing import _frame, _how, _wished
 from organza.picture import Picture
 from organza.scene import Scene, scene_of
+from organza.values import whole
 
 # Layers whose mean over sets is the layer of all sets.
 _AVERAGED = ("beauty", "alpha", "background", "ambient", "emission", "direct", "scatter1", "scatterN", "reflection", "refraction")
@@ -79,7 +80,7 @@ def frames(
     list of dask.delayed.Delayed
         Each computes a :class:`organza.Picture`.
     """
-    total = _whole("count", count) or 1
+    total = whole("count", count) or 1
     wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit) | {"turntable": total}
     how = _how(threads, max_memory, None, drop_invalid, strict)
     held = _held(scene_of((_placed(what),), wished, how))
@@ -133,10 +134,10 @@ def sets(
         between tasks. Depths, normals and objects are not averaged, and are left out with a note. The mean is taken in the order of the ranks, so the bits
         depend on ``count``, ``each`` and ``seed`` alone.
     """
-    total = _whole("count", count) or 1
+    total = whole("count", count) or 1
     if total < 2 * _FEWEST:
         raise InputError(f"count: expected {2 * _FEWEST} sets or more, whose differences are the error, found {count!r}")
-    part = _whole("each", each) or 1
+    part = whole("each", each) or 1
     if part < _FEWEST:
         raise InputError(f"each: expected {_FEWEST} sets or more, found {each!r}")
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:

@@ -15,6 +15,7 @@ from organza.checking import named
 from organza.drawing import _how, _wished, unused_goal, warn
 from organza.progressing import Progress, heard
 from organza.scene import Scene, _is_scene, scene_of
+from organza.values import flag
 
 # Doublings of the ends of knobs that a report can take.
 _MOST_FINER = 4
@@ -107,7 +108,7 @@ def explain(
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
         given = scene._given(how, effects, size)
-        document = _dict(_organza.explain(given, measure, how))
+        document = _dict(_organza.explain(given, flag("measure", measure), how))
     unused = unused_goal(given, how, "organza.explain, which tells of the scene's own settings")
     document["warnings"] += unused
     warn(unused)
@@ -170,7 +171,7 @@ def accuracy(
     with heard(progress) as told, _folder(folder) as made:
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
-        effort = {"quick": quick, "finer": finer, "folder": made, "force": force}
+        effort = {"quick": flag("quick", quick), "finer": finer, "folder": made, "force": flag("force", force)}
         given = scene._given(how, effects, size)
         report = _dict(_organza.judge_accuracy(given, effort, how))
     warn(unused_goal(given, how, "organza.accuracy, which measures the scene's own settings"))
@@ -215,7 +216,7 @@ def orders(
     with heard(progress) as told, _folder(folder) as made:
         how = _how(threads, max_memory, told, drop_invalid, strict)
         scene = scene_of(what, _wished(size, preset, color_by, up, ground, azimuth, elevation, fit), how)
-        effort = {"quick": quick, "finer": 0, "folder": made, "force": force}
+        effort = {"quick": flag("quick", quick), "finer": 0, "folder": made, "force": flag("force", force)}
         given = scene._given(how, effects, size)
         report = _dict(_organza.judge_orders(given, effort, how))
     warn(unused_goal(given, how, "organza.orders, which measures the scene's own settings"))

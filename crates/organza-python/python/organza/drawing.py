@@ -6,18 +6,12 @@ import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from organza import _organza
-from organza._organza import InputError
-from organza.arrays import number
 from organza.checking import named
 from organza.picture import Picture
-from organza.progressing import Progress, heard
+from organza.progressing import Progress, check_progress, heard
 from organza.scene import Scene, scene_of
-
-# More than any picture, machine or film has, and exact as a number with a point.
-_MOST = 2**53
+from organza.values import flag, number, sides_of, text, whole
 
 
 @named
@@ -132,7 +126,8 @@ def turntable(
         As for :func:`render`. The camera turns about the vertical from where it stands: ``azimuth`` and ``elevation`` of data, and what
         ``scene.camera.orbit(azimuth=…, elevation=…)`` says of a scene.
     """
-    frames = _whole("frames", frames) or 1
+    frames = whole("frames", frames) or 1
+    check_progress(progress)
     how = _how(threads, max_memory, None, drop_invalid, strict)
     wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit) | {"turntable": frames}
     # Files and names are refused by the call, not by the first picture.
@@ -198,24 +193,12 @@ def _how(
     threads: int | None, max_memory: int | None, progress: Progress | None, drop_invalid: bool, strict: bool
 ) -> dict[str, Any]:
     return {
-        "threads": _whole("threads", threads),
-        "max_memory": _whole("max_memory", max_memory),
+        "threads": whole("threads", threads),
+        "max_memory": whole("max_memory", max_memory, "bytes"),
         "progress": progress,
-        "drop_invalid": drop_invalid,
-        "strict": strict,
+        "drop_invalid": flag("drop_invalid", drop_invalid),
+        "strict": flag("strict", strict),
     }
-
-
-def _whole(name: str, value: Any) -> int | None:
-    """A whole number from 1 on; None stays None."""
-    if value is None:
-        return None
-    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if is_number and value > _MOST:
-        raise InputError(f"{name}: expected at most {_MOST}, found {value!r}")
-    if not is_number or not value >= 1 or value != int(value):
-        raise InputError(f"{name}: expected a whole number from 1 on, found {value!r}")
-    return int(value)
 
 
 def _wished(
@@ -228,17 +211,12 @@ def _wished(
     elevation: float | None,
     fit: float | None,
 ) -> dict[str, Any]:
-    if size is not None:
-        sides = [_whole("size", side) for side in size] if np.ndim(size) == 1 else []
-        if len(sides) != 2:
-            raise InputError(f"size: expected a width and a height, found {size!r}")
-        size = (sides[0] or 1, sides[1] or 1)
     return {
-        "size": size,
-        "preset": preset,
-        "color_by": color_by,
-        "up": up,
-        "ground": ground,
+        "size": sides_of(size),
+        "preset": text("preset", preset, "the name of a look"),
+        "color_by": text("color_by", color_by, "the name of a column"),
+        "up": text("up", up, "'y', 'z' or '-y'"),
+        "ground": flag("ground", ground),
         "azimuth": None if azimuth is None else number("azimuth", azimuth),
         "elevation": None if elevation is None else number("elevation", elevation),
         "fit": None if fit is None else number("fit", fit),

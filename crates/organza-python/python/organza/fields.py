@@ -11,7 +11,7 @@ import numpy as np
 
 from organza._organza import Data, InputError
 from organza.arrays import array_of
-from organza.lattices import lattice_of, percentiles, volume_arguments
+from organza.lattices import filled, lattice_of, percentiles, volume_arguments
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
 
@@ -31,8 +31,8 @@ class Field:
 def field_of(
     field: Any,
     lattice: Mapping[str, Any],
-    colormap: str | None,
-    clim: tuple[float, float] | None,
+    colormap: Any,
+    clim: tuple[float | None, float | None] | None,
     transfer: Transfer | None,
     log_scale: bool = False,
     shape: tuple[int, ...] | None = None,
@@ -44,8 +44,10 @@ def field_of(
         raise InputError("transfer, colormap, clim: expected the colours of the field once, found them twice")
     if log_scale:
         raise InputError("log_scale: expected a column to colour by, found a `field`; give the logarithms of its values")
+    colors = transfer if transfer is not None else make_transfer("viridis" if colormap is None else colormap, clim)
     table: dict[str, Any] = {}
     data = None
+    values: Any = None
     if isinstance(field, (str, os.PathLike)):
         table["volume"] = os.path.abspath(field)
     elif isinstance(field, Mapping) and "values" not in field:
@@ -57,17 +59,15 @@ def field_of(
             raise InputError(f"field: expected the keys {', '.join(_LATTICE)}, found `{unknown[0]}`")
         if "interpolation" in stated:
             table["interpolation"] = stated["interpolation"]
-        own = [stated.get(key) for key in ("spacing", "origin", "direction")]
-        arguments, _ = volume_arguments(stated["values"], *own)
-        found = np.shape(array_of(arguments["values"]))
+        arguments, _ = volume_arguments(stated["values"], stated.get("spacing"), stated.get("origin"), stated.get("direction"), "field")
+        values = arguments["values"]
+        found = np.shape(array_of(values, "field"))
         if shape is not None and "spacing" not in arguments and len(found) == len(shape) and found != shape:
             raise InputError(
                 f'field: expected the shape {shape} of `values`, found {found}; {{"values": …, "spacing": …}} states steps of its own'
             )
-        data, _ = lattice_of(**(dict(lattice) | arguments))
-        if transfer is None and clim is None:
-            clim = percentiles(arguments["values"])
-    if transfer is None and clim is None:
-        raise InputError("clim: expected the values at the ends of the map for the field of a file, which is not read yet, found none")
-    colors = transfer if transfer is not None else make_transfer(colormap or "viridis", clim or (0.0, 1.0))
-    return Field(data, table, {"transfer": [{key: point[key] for key in ("value", "color")} for point in colors.points]})
+        data, _ = lattice_of(**(dict(lattice) | arguments), name="field, values")
+    if values is None and None in colors.clim:
+        ends = "none" if clim is None else clim
+        raise InputError(f"clim: expected the values at the ends of the map for the field of a file, which is not read yet, found {ends}")
+    return Field(data, table, {"transfer": colors.colors_over(filled(colors.clim, lambda: percentiles(values, "field")))})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,9 @@ import numpy as np
 
 from organza import adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of, finite_steps, place_of
+from organza.arrays import array_of, finite_steps
+from organza.transfers import Ends
+from organza.values import place_of
 
 
 @dataclass(frozen=True)
@@ -21,18 +24,18 @@ class Lattice:
     corners: np.ndarray
 
 
-def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), direction: Any = None) -> tuple[Data, Lattice]:
-    """The data of a volume, and where it lies."""
-    grid = array_of(values)
-    try:
-        steps = np.asarray(spacing, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"spacing: expected one number or three, found {spacing!r}") from None
-    if steps.shape not in ((), (3,)):
-        raise InputError(f"spacing: expected one number or three, found the shape {steps.shape}")
+def lattice_of(
+    values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), direction: Any = None, name: str = "values"
+) -> tuple[Data, Lattice]:
+    """The data of a volume, which is the argument ``name``, and where it lies."""
+    grid = array_of(values, name)
+    steps = _steps(spacing)
     finite_steps(steps, spacing)
-    if np.ndim(grid) == 3 and not grid.size:
-        raise InputError(f"values: expected a volume with voxels, found the shape {grid.shape}")
+    if np.ndim(grid) != 3:
+        part = "; take one volume of a series, or one channel, such as `values[0]`" if np.ndim(grid) == 4 else ""
+        raise InputError(f"{name}: expected the shape (nz, ny, nx), found {np.shape(grid)}{part}")
+    if not grid.size:
+        raise InputError(f"{name}: expected a volume with voxels, found the shape {grid.shape}")
     steps = np.broadcast_to(steps, (3,))
     turn = np.eye(3) if direction is None else _directions(direction)
     first = np.array(place_of("origin", origin))
@@ -41,6 +44,16 @@ def lattice_of(values: Any, spacing: Any = 1.0, origin: Any = (0.0, 0.0, 0.0), d
     ends = np.stack(np.meshgrid([0.0, 1.0], [0.0, 1.0], [0.0, 1.0]), -1).reshape(-1, 3)
     corners = first + (ends * sides) @ turn.T
     return data, Lattice(float(np.linalg.norm(sides)), (first + turn @ sides / 2.0).tolist(), corners)
+
+
+def _steps(spacing: Any) -> np.ndarray:
+    """The steps of a volume, one number or three."""
+    if isinstance(spacing, str):
+        raise InputError(f"spacing: expected one number or three, found {spacing!r}")
+    steps = np.asarray(array_of(spacing, "spacing"), dtype=float)
+    if steps.shape not in ((), (3,)):
+        raise InputError(f"spacing: expected one number or three, found the shape {steps.shape}")
+    return steps
 
 
 def _directions(direction: Any) -> np.ndarray:
@@ -73,7 +86,7 @@ def check_plane(center: list[float], normal: list[float], corners: np.ndarray) -
 
 def _ends(values: Any) -> tuple[float, float]:
     """The least and the largest finite value."""
-    numbers = np.asarray(array_of(values))
+    numbers = np.asarray(array_of(values, "values"))
     if np.issubdtype(numbers.dtype, np.floating):
         numbers = numbers[np.isfinite(numbers)]
     if not numbers.size:
@@ -81,25 +94,41 @@ def _ends(values: Any) -> tuple[float, float]:
     return float(numbers.min()), float(numbers.max())
 
 
-def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Arguments of :func:`lattice_of`, of an array or a data set; and the transform that the data set's library has."""
-    arguments = adopted.volume_of(values)
+def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any, name: str = "values") -> tuple[dict[str, Any], dict[str, Any]]:
+    """Arguments of :func:`lattice_of`, of an array or a data set, which is the argument ``name``; and the transform that the data set's library has."""
+    if values is None:
+        raise InputError(f"{name}: expected a volume, found None")
+    arguments = adopted.volume_of(values, name)
     stated = {"spacing": spacing, "origin": origin, "direction": direction}
     arguments |= {key: value for key, value in stated.items() if value is not None}
     # Steps of other libraries may go backwards; those of an argument are lengths.
-    if isinstance(spacing, (int, float, list, tuple, np.ndarray)) and np.any(np.less(spacing, 0)):
+    if spacing is not None and (_steps(spacing) < 0.0).any():
         raise InputError(f"spacing: expected steps above 0, found {spacing!r}; `direction` turns an axis, and `values[::-1]` its order")
     transform = arguments.pop("transform", None)
     return arguments, {} if transform is None else {"transform": transform}
 
 
-def percentiles(values: Any) -> tuple[float, float]:
+def filled(clim: Ends, found: Callable[[], tuple[float, float]]) -> tuple[float, float]:
+    """The ends of a map, of which those that are not stated are found."""
+    low, high = clim
+    if low is not None and high is not None:
+        return low, high
+    least, greatest = found()
+    ends = (least if low is None else low, greatest if high is None else high)
+    if not ends[0] < ends[1]:
+        raise InputError(f"clim: expected two growing numbers, found {clim}, and {least:g} to {greatest:g} in the data")
+    return ends
+
+
+def percentiles(values: Any, name: str = "values", what: str = "a voxel with a value") -> tuple[float, float]:
     """The 1st and 99th percentile of the finite values; where both are one, the least and greatest; growing in any case."""
-    numbers = np.asarray(array_of(values), dtype=float)
-    finite = numbers[np.isfinite(numbers)]
-    if not finite.size:
-        raise InputError("values: expected a voxel with a value, found none")
-    low, high = (float(end) for end in np.percentile(finite, [1.0, 99.0]))
+    numbers = np.asarray(array_of(values, name))
+    if numbers.dtype.kind == "f":
+        numbers = numbers.astype(np.float64)
+        numbers = numbers[np.isfinite(numbers)]
+    if not numbers.size:
+        raise InputError(f"{name}: expected {what}, found none")
+    low, high = (float(end) for end in np.percentile(numbers, [1.0, 99.0]))
     if low == high:
-        low, high = float(finite.min()), float(finite.max())
+        low, high = float(numbers.min()), float(numbers.max())
     return (low, high) if low < high else (low, low + max(abs(low), 1.0))

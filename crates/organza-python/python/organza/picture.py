@@ -12,6 +12,7 @@ import numpy as np
 
 from organza import _organza
 from organza._organza import InputError
+from organza.values import flag
 
 
 class Picture:
@@ -105,7 +106,7 @@ class Picture:
 
     def to_srgb8(self, transparent: bool = False) -> np.ndarray:
         """The displayed picture, bytes of sRGB as its PNG file has them: (height, width, 3), or 4 channels where ``transparent``."""
-        return self._drawn.srgb8(transparent)
+        return self._drawn.srgb8(flag("transparent", transparent))
 
     def save(
         self,
@@ -136,6 +137,11 @@ class Picture:
         force
             Whether a file of that name is replaced.
         """
+        if not isinstance(legend, (bool, str)):
+            raise InputError(f"legend: expected True, False, 'over' or 'beside', found {legend!r}")
+        transparent, deep, half, force = (
+            flag(name, value) for name, value in (("transparent", transparent), ("deep", deep), ("half", half), ("force", force))
+        )
         ending = os.path.splitext(os.fspath(path))[1].lower()
         is_exr = ending == ".exr"
         # Of an ending that no file has, writing says so.
@@ -146,8 +152,6 @@ class Picture:
                 raise InputError(f"{name}: expected a file that can have it, found {os.fspath(path)}")
         if not force and os.path.exists(path):
             raise FileExistsError(f"{os.fspath(path)}: this file exists already; force=True replaces it")
-        if not isinstance(legend, (bool, str)):
-            raise InputError(f"legend: expected True, False, 'over' or 'beside', found {legend!r}")
         place = legend if isinstance(legend, str) else "over" if legend else None
         for sentence in self._drawn.save(path, transparent, deep, half, place, force):
             warnings.warn(sentence, stacklevel=2)

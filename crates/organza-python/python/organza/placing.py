@@ -11,8 +11,9 @@ import numpy as np
 
 from organza import _organza
 from organza._organza import InputError
-from organza.arrays import number, place_of, plain
+from organza.arrays import plain
 from organza.checking import check_sun_keys, named
+from organza.values import kind_of, number, parts_of, place_of, sides_of
 
 if TYPE_CHECKING:
     from organza.scene import Scene
@@ -60,15 +61,9 @@ class Camera:
         """
         self._scene._check_open()
         camera = dict(self._scene._document.get("camera", {}))
-        stated = {
-            "position": position,
-            "target": target,
-            "azimuth": azimuth,
-            "elevation": elevation,
-            "fit": fit,
-            "fov_y": fov_y,
-            "size": size,
-        }
+        angles = {"azimuth": azimuth, "elevation": elevation, "fit": fit, "fov_y": fov_y}
+        stated: dict[str, Any] = {"position": position, "target": target, "size": sides_of(size)}
+        stated |= {key: None if value is None else number(key, value) for key, value in angles.items()}
         if position is not None and not (azimuth is None and elevation is None and fit is None):
             raise InputError("camera: expected a position, or azimuth, elevation and fit, found both")
         # One way to place it takes the place of the other.
@@ -120,6 +115,8 @@ class Light:
             Keys of a light (docs/scene.md).
         """
         self._scene._check_open()
+        if not isinstance(kind, str):
+            raise InputError(f"kind: expected a text, such as 'directional' or 'point', found {kind_of(kind)}")
         called = {} if name is None else {"name": name}
         light = plain({"kind": kind} | called | {key: value for key, value in keys.items() if value is not None})
         _organza.check(json.dumps({"version": 1, "camera": {"auto": True}, "light": [light]}), {})
@@ -227,7 +224,7 @@ def _transformed(places: np.ndarray, transform: Mapping[str, Any]) -> np.ndarray
 
 def _color(name: str, value: Any) -> list[float]:
     """Three channels, of one number or three."""
-    parts = list(value) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) == 1 else [value] * 3
+    parts = parts_of(value) if isinstance(value, (list, tuple, np.ndarray)) else [value] * 3
     if len(parts) != 3:
         raise InputError(f"{name}: expected one number or three, found {value!r}")
     return [number(name, part) for part in parts]

@@ -8,34 +8,53 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
 from organza._organza import InputError
+from organza.values import kind_of
 
 Progress = Callable[[str, float], object]
 
+# How a bar of tqdm looks.
+_FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}"
 # Lines without tqdm: one for each such share of a stage.
 _SHARE_OF_A_LINE = 0.1
 
 
+def check_progress(progress: Any) -> None:
+    """Refuses what hears no progress."""
+    if progress is None or isinstance(progress, (bool, np.bool_)) or callable(progress) or _is_bar(progress):
+        return
+    raise InputError(f"progress: expected a function of a stage and a share, a bar of tqdm, or True, found {kind_of(progress)}")
+
+
 @contextmanager
 def heard(progress: Any) -> Iterator[Progress | None]:
-    """What the extension calls meanwhile: a function as it is; of True a bar of tqdm, or lines on stderr where that is not installed; a bar that the caller
-    made stays the caller's."""
-    if progress is None or progress is False:
+    """What the extension calls meanwhile: a function as it is; of True a bar of tqdm, or lines on stderr where that is not installed; of a class of bars one
+    of these; a bar that the caller made stays the caller's."""
+    check_progress(progress)
+    if progress is None or (isinstance(progress, (bool, np.bool_)) and not progress):
         yield None
-    elif progress is True:
+    elif isinstance(progress, (bool, np.bool_)):
         try:
             tqdm: Any = importlib.import_module("tqdm.auto")
         except ImportError:
             yield _lines()
             return
-        with tqdm.tqdm(total=1.0, bar_format="{desc}: {percentage:3.0f}%|{bar}| {elapsed}", leave=False) as made:
+        with tqdm.tqdm(total=1.0, bar_format=_FORMAT, leave=False) as made:
             yield _moving(made)
-    elif hasattr(progress, "update") and hasattr(progress, "set_description"):
+    elif isinstance(progress, type) and _is_bar(progress):
+        with progress(total=1.0, bar_format=_FORMAT, leave=False) as made:
+            yield _moving(made)
+    elif _is_bar(progress):
         yield _moving(progress)
-    elif callable(progress):
-        yield progress
     else:
-        raise InputError(f"progress: expected a function of a stage and a share, a bar of tqdm, or True, found {progress!r}")
+        yield progress
+
+
+def _is_bar(progress: Any) -> bool:
+    """Whether it has what a bar of tqdm has, or a class of such bars."""
+    return hasattr(progress, "update") and hasattr(progress, "set_description")
 
 
 def _moving(bar: Any) -> Progress:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import functools
 import json
 import math
 import os
+import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +17,15 @@ import numpy as np
 
 from organza import _organza, adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, number, place_of, plain, radii_of, texture_of
+from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, plain, radii_of, texture_of
 from organza.checking import check_keys, meant, of_object
 from organza.fields import Field, field_of
-from organza.lattices import check_level, check_plane, lattice_of, percentiles, volume_arguments
+from organza.lattices import check_level, check_plane, filled, lattice_of, percentiles, volume_arguments
 from organza.paths import path_in
 from organza.placing import Camera, Light, beyond
-from organza.transfers import Transfer
+from organza.transfers import Transfer, clim_of, is_named
 from organza.transfers import transfer as make_transfer
+from organza.values import flag, kind_of, number, place_of, sides_of, text
 
 _DEFAULT_SIZE = (960, 540)
 # The material of slices that name none: the colours of their map, as they are.
@@ -126,10 +129,10 @@ class Scene:
         radius: Any = None,
         values: Any = None,
         opacities: Any = None,
-        columns: Mapping[str, Any] | None = None,
+        columns: Any = None,
         color_by: str | None = None,
-        colormap: str | None = None,
-        clim: tuple[float, float] | None = None,
+        colormap: Any = None,
+        clim: tuple[float | None, float | None] | None = None,
         log_scale: bool = False,
         field: Any = None,
         transfer: Transfer | None = None,
@@ -153,12 +156,13 @@ class Scene:
         opacities
             (n,), from 0 to 1.
         columns
-            Further columns by name, (n,) each.
+            Further columns by name, (n,) each: a mapping such as ``{"heat": array}``, or a data frame of pandas.
         color_by
             The column that colours stand for: ``"value"``, one of ``columns``, ``"x"``, ``"y"``, ``"z"`` or ``"height"``; ``values`` where they are given
             without colours.
         colormap, clim
-            Its map and the numbers at the two ends of it. Only ``unlit=True`` shows the very colours of the map.
+            Its map, as for :func:`organza.transfer`, and the numbers at the two ends of it; the 1st and the 99th percentile of the column in the place of None, of
+            both or of one of them. Only ``unlit=True`` shows the very colours of the map.
         log_scale
             Whether numbers lie along the map by their logarithms; those that are not above 0 have the object's colour.
         field
@@ -181,16 +185,18 @@ class Scene:
             raise InputError(f"values: expected an array of numbers, found the text {values!r}; `color_by={values!r}` shows a column of `columns`")
         _check_finite("values", values)
         check_keys(Scene.add_points, name or "points", keys)
-        held = dict(columns or {})
+        held = columns_of(columns)
         if radius is not None:
-            count = len(positions)
-            held["radius"] = radii_of(radius, count)
+            held["radius"] = radii_of(radius, len(positions))
+        places = array_of(positions, "positions")
+        shown_values = array_of(values, "values")
         data = Data.points(
-            array_of(positions), array_of(normals), colors_of(colors), array_of(opacities), array_of(values), columns_of(held)
+            places, array_of(normals, "normals"), colors_of(colors), array_of(opacities, "opacities"), shown_values, held
         )
         if color_by is None and values is not None and colors is None and field is None:
             color_by = "value"
-        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer)
+        numbers = _axes(places) | held | ({} if values is None else {"value": shown_values})
+        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer, numbers)
         keys = colors_by | keys
         self._add("points", data, name, keys, field=shown)
         self._note_beyond(self.objects[-1], positions, keys)
@@ -199,7 +205,7 @@ class Scene:
     def add_mesh(
         self,
         vertices: Any,
-        faces: Any,
+        faces: Any = None,
         *,
         normals: Any = None,
         colors: Any = None,
@@ -207,10 +213,10 @@ class Scene:
         uv: Any = None,
         texture: Any = None,
         values: Any = None,
-        columns: Mapping[str, Any] | None = None,
+        columns: Any = None,
         color_by: str | None = None,
-        colormap: str | None = None,
-        clim: tuple[float, float] | None = None,
+        colormap: Any = None,
+        clim: tuple[float | None, float | None] | None = None,
         log_scale: bool = False,
         field: Any = None,
         transfer: Transfer | None = None,
@@ -258,6 +264,8 @@ class Scene:
             A texture that is not there.
         """
         _check_array("vertices", vertices)
+        if faces is None:
+            raise InputError("faces: expected indices of vertices, of the shape (m, 3) or (m, 4), found none; add_points takes vertices alone")
         _check_finite("vertices", vertices)
         _check_faces(faces)
         if isinstance(values, str):
@@ -265,8 +273,9 @@ class Scene:
         _check_finite("values", values)
         _check_array("faces", faces)
         check_keys(Scene.add_mesh, name or "mesh", keys)
-        corners = array_of(faces)
-        places = array_of(uv)
+        corners = array_of(faces, "faces")
+        places = array_of(uv, "uv")
+        shape = array_of(vertices, "vertices")
         count = len(corners) if np.ndim(corners) else 0
         is_of_quads = np.ndim(corners) == 2 and corners.shape[1] == 4
         if is_of_quads:
@@ -275,20 +284,22 @@ class Scene:
                 places = halved_quads(places)
         of_vertices: dict[str, Any] = {}
         of_faces: dict[str, Any] = {}
-        vertex_count = len(vertices) if np.ndim(vertices) else 0
-        stated = ({} if values is None else {"value": values}) | dict(columns or {})
-        for column, array in stated.items():
-            numbers = array_of(array)
-            if np.ndim(numbers) == 1 and len(numbers) == count and count != vertex_count:
-                of_faces[str(column)] = np.concatenate([numbers, numbers]) if is_of_quads else numbers
+        vertex_count = len(shape) if np.ndim(shape) else 0
+        numbers = ({} if values is None else {"value": array_of(values, "values")}) | columns_of(columns)
+        for column, array in numbers.items():
+            if np.shape(array) not in ((vertex_count,), (count,)):
+                argument = "values" if column == "value" else f"columns, '{column}'"
+                raise InputError(f"{argument}: expected the shape ({vertex_count},) of vertices or ({count},) of faces, found {np.shape(array)}")
+            if len(array) == count and count != vertex_count:
+                of_faces[column] = np.concatenate([array, array]) if is_of_quads else array
             else:
-                of_vertices[str(column)] = numbers
+                of_vertices[column] = array
         data = Data.mesh(
-            array_of(vertices),
+            shape,
             corners,
-            normals=array_of(normals),
+            normals=array_of(normals, "normals"),
             colors=colors_of(colors),
-            opacities=array_of(opacities),
+            opacities=array_of(opacities, "opacities"),
             columns=of_vertices,
             face_columns=of_faces,
             uv=places,
@@ -296,7 +307,7 @@ class Scene:
         )
         if color_by is None and values is not None and colors is None and texture is None and field is None:
             color_by = "value"
-        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer)
+        shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer, _axes(shape) | numbers)
         keys = colors_by | keys
         self._add("mesh", data, name, keys, field=shown)
         self._note_beyond(self.objects[-1], vertices, keys)
@@ -328,7 +339,7 @@ class Scene:
         direction
             Columns: the directions of the steps along x, y and z; those of the axes where it is None.
         transfer
-            What values show, from :func:`organza.transfer`; one that fits the values where it is None.
+            What values show, from :func:`organza.transfer`, whose ``clim`` may be left to the values; one that fits the values where it is None.
         preset
             Instead of ``transfer``, a look by its name, such as ``"ct-bone"``, ``"mri"``, ``"cloud"`` or a map.
         name, **keys
@@ -336,6 +347,8 @@ class Scene:
         """
         check_keys(Scene.add_volume, name or "volume", keys)
         _check_look(transfer, preset)
+        if keys.get("labels") is not None and transfer is None and preset is None:
+            preset = "labels"
         if isinstance(values, (str, os.PathLike)):
             stated = {"spacing": spacing, "origin": origin, "direction": direction}
             for argument, value in stated.items():
@@ -349,13 +362,14 @@ class Scene:
         data, lattice = lattice_of(**arguments)
         source = "volume"
         if transfer is not None:
-            keys = transfer.keys(lattice.diagonal or 1.0) | keys
+            ends = filled(transfer.clim, lambda: percentiles(arguments["values"]))
+            keys = transfer.keys(lattice.diagonal or 1.0, ends) | keys
             if "material" not in keys:
                 # As first scenes have it: lit by its gradients, so that its shape is seen.
                 keys = {"material": _LIT_VOLUME} | keys
         elif "transfer" not in keys:
             source, found = self._first_keys(data, name or "volume", preset)
-            keys = found | keys
+            keys = _without_colors(found, keys) | keys
         self._add(source, data, name, keys)
         self._note_beyond(self.objects[-1], lattice.corners, keys)
 
@@ -367,8 +381,8 @@ class Scene:
         *,
         inside: str = "above",
         field: Any = None,
-        colormap: str | None = None,
-        clim: tuple[float, float] | None = None,
+        colormap: Any = None,
+        clim: tuple[float | None, float | None] | None = None,
         transfer: Transfer | None = None,
         spacing: Any = None,
         origin: Any = None,
@@ -410,7 +424,7 @@ class Scene:
         check_keys(Scene.add_isosurface, name or "isosurface", keys)
         if field is None and not (colormap is None and clim is None and transfer is None):
             raise InputError("colormap, clim, transfer: expected a `field` to colour by, found none; `color` takes one colour")
-        if inside not in ("above", "below"):
+        if not isinstance(inside, str) or inside not in ("above", "below"):
             raise InputError(f"inside: expected 'above' or 'below', found {inside!r}")
         height = number("level", level)
         table = {"level": height, "inside": inside}
@@ -422,7 +436,7 @@ class Scene:
         data, lattice = lattice_of(**arguments)
         check_level(height, arguments["values"])
         own = {key: value for key, value in arguments.items() if key != "values"}
-        shown = None if field is None else field_of(field, own, colormap, clim, transfer, shape=np.shape(array_of(arguments["values"])))
+        shown = None if field is None else field_of(field, own, colormap, clim, transfer, shape=np.shape(array_of(arguments["values"], "values")))
         self._add("isosurface", data, name, standing | keys, table, shown)
         self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
@@ -433,8 +447,8 @@ class Scene:
         *,
         normal: Any = "z",
         center: Any = None,
-        colormap: str = "grey",
-        clim: tuple[float, float] | None = None,
+        colormap: Any = "grey",
+        clim: tuple[float | None, float | None] | None = None,
         transfer: Transfer | None = None,
         spacing: Any = None,
         origin: Any = None,
@@ -476,7 +490,8 @@ class Scene:
             raise InputError(f"transfer: expected what organza.transfer makes, found {type(transfer).__name__}; `colormap` takes a name")
         across = axes[normal] if isinstance(normal, str) else place_of("normal", normal)
         is_file = isinstance(values, (str, os.PathLike))
-        if is_file and (center is None or (transfer is None and clim is None)):
+        colors = transfer if transfer is not None else make_transfer(colormap, clim)
+        if is_file and (center is None or None in colors.clim):
             raise InputError("center, clim: expected both for the slice of a file, which is not read yet; or give its values")
         table: dict[str, Any] = {"normal": across}
         standing: dict[str, Any] = {}
@@ -484,12 +499,10 @@ class Scene:
             arguments, standing = volume_arguments(values, spacing, origin, direction)
             data, lattice = lattice_of(**arguments)
             center = lattice.middle if center is None else center
-            clim = percentiles(arguments["values"]) if clim is None and transfer is None else clim
         table["center"] = place_of("center", center)
         if not is_file:
             check_plane(table["center"], across, lattice.corners)
-        colors = transfer if transfer is not None else make_transfer(colormap, clim or (0.0, 1.0))
-        points = [{key: point[key] for key in ("value", "color")} for point in colors.points]
+        points = colors.colors_over(filled(colors.clim, lambda: percentiles(arguments["values"])))
         if "material" not in keys:
             keys = {"material": _UNLIT_SLICE} | keys
         keys = standing | {"transfer": points} | keys
@@ -505,8 +518,8 @@ class Scene:
         *,
         labels: Any = None,
         field: Any = None,
-        colormap: str | None = None,
-        clim: tuple[float, float] | None = None,
+        colormap: Any = None,
+        clim: tuple[float | None, float | None] | None = None,
         transfer: Transfer | None = None,
         spacing: Any = None,
         origin: Any = None,
@@ -549,11 +562,8 @@ class Scene:
             self._add_file("mesh", values, None, name, looks | keys, shown)
             return
         arguments, standing = volume_arguments(values, spacing, origin, direction)
-        numbers = array_of(arguments["values"])
-        if not np.issubdtype(numbers.dtype, np.integer) and not np.array_equal(numbers, np.round(numbers), equal_nan=True):
-            raise InputError("values: expected whole numbers that name regions, found numbers with a part")
-        if not np.nan_to_num(numbers).any():
-            raise InputError("values: expected a label other than 0, which is nothing, found none")
+        numbers = array_of(arguments["values"], "values")
+        _check_labels(numbers)
         data, lattice = lattice_of(**(arguments | {"values": numbers}))
         own = {key: value for key, value in arguments.items() if key != "values"}
         shown = None if field is None else field_of(field, own, colormap, clim, transfer, shape=np.shape(numbers))
@@ -563,6 +573,7 @@ class Scene:
             self._remarks.append(f"{self.objects[-1]}: `labels` names {', '.join(missing)}, which no voxel has")
         self._note_beyond(self.objects[-1], lattice.corners, standing | keys)
 
+    @of_object
     def add(
         self,
         thing: Any,
@@ -570,8 +581,8 @@ class Scene:
         preset: str | None = None,
         transfer: Transfer | None = None,
         color_by: Any = None,
-        colormap: str | None = None,
-        clim: tuple[float, float] | None = None,
+        colormap: Any = None,
+        clim: tuple[float | None, float | None] | None = None,
         log_scale: bool = False,
         up: str | None = None,
         name: str | None = None,
@@ -597,15 +608,20 @@ class Scene:
         """
         if isinstance(thing, (str, os.PathLike)):
             label = name or Path(thing).name
+            text("up", up, "'y', 'z' or '-y'")
             check_keys(Scene.add, label, keys)
             _check_look(transfer, preset)
             wish = {"preset": preset, "up": up, "color_by": color_by if isinstance(color_by, str) else None}
             if color_by is not None and not isinstance(color_by, str):
                 keys = {"color_by": color_by} | keys
-            scale = _shown("", colormap, clim, log_scale)["color_by"]
+            if not is_named(colormap):
+                raise InputError(f"colormap: expected the name of a map for a file, found {kind_of(colormap)}")
+            if clim is not None and None in clim_of(clim):
+                raise InputError(f"clim: expected two numbers for a file, which is not read yet, found {clim!r}")
+            scale = _shown("", colormap, clim, flag("log_scale", log_scale))["color_by"]
             self._take(scene_of((os.path.abspath(thing),), _no_wish() | wish, _how()), name, keys, transfer, scale=scale)
             return
-        stated = {"preset": preset, "transfer": transfer, "color_by": color_by, "colormap": colormap, "clim": clim, "log_scale": log_scale or None}
+        stated = {"preset": preset, "transfer": transfer, "color_by": color_by, "colormap": colormap, "clim": clim, "log_scale": flag("log_scale", log_scale) or None}
         stated["transform"] = None if up is None else {"up": up}
         adopted.add(self, thing, name, {key: value for key, value in stated.items() if value is not None} | keys)
 
@@ -624,7 +640,7 @@ class Scene:
         """
         self._check_open()
         objects = self._document.get("object", [])
-        if name not in self.objects:
+        if not isinstance(name, str) or name not in self.objects:
             known = ", ".join(self.objects) or "none"
             question = meant(name, self.objects) if isinstance(name, str) else ""
             raise InputError(f"remove: expected the name of an object, one of {known}, found {name!r}{question}")
@@ -647,7 +663,7 @@ class Scene:
         beginning."""
         self._check_open()
         if not isinstance(key, str):
-            raise InputError(f"key: expected a text, such as 'render.technique', found {_kind(key)}")
+            raise InputError(f"key: expected a text, such as 'render.technique', found {kind_of(key)}")
         parts = path_in(self._document, key)
         if not all(parts) or value is None:
             raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
@@ -963,11 +979,13 @@ class Scene:
             if transfer is not None:
                 if source != "volume":
                     raise InputError(f"transfer: expected a volume of amounts, found {source}: {file}; leave it out")
-                thing |= transfer.keys(_diagonal(file))
+                facts = _organza.info_of_file(file, _how())
+                thing |= transfer.keys(_diagonal(facts), filled(transfer.clim, functools.partial(_ends_of_file, facts)))
             if stated:
                 if "color_by" not in thing | dict(keys):
                     raise InputError(f"colormap, clim, log_scale: expected a column to colour by, found none in {source}: {file}; give `color_by`")
                 thing["color_by"] = thing.get("color_by", {}) | stated
+            thing = _without_colors(thing, keys)
             self._take_material(first._document, thing, thing["name"])
             thing["name"] = self._name(name, thing["name"])
             thing |= plain({key: value for key, value in _looks(thing, keys).items() if value is not None})
@@ -992,6 +1010,8 @@ class Scene:
         turntable: int | None = None,
     ) -> dict[str, Any]:
         """The scene as the extension takes it, with what it does not state; ``turntable`` is the pictures of a turn around it."""
+        size = sides_of(size)
+        transparent = flag("transparent", transparent)
         if effects is not None and not isinstance(effects, Mapping):
             raise InputError(f"effects: expected names with 'on' or 'off', such as {{'shadow.sun': 'off'}}, found {effects!r}")
         switches = [f"{name}={_switch(str(name), state)}" for name, state in (effects or {}).items()]
@@ -1066,7 +1086,7 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
     """A scene, or the first scene of files and data."""
     if not what:
         raise InputError("what: expected a scene, files or data, found nothing")
-    wishes = {key: value for key, value in wished.items() if value and key not in ("size", "turntable")}
+    wishes = [key for key, value in wished.items() if value is not None and value is not False and key not in ("size", "turntable")]
     if len(what) == 1 and (isinstance(what[0], Scene) or _is_scene(what[0])):
         if wishes:
             raise InputError(f"{', '.join(wishes)}: expected data, found a scene, which states that itself: by scene.camera.orbit, scene.ground and its objects")
@@ -1109,16 +1129,25 @@ def _check_shape(document: Mapping[str, Any]) -> None:
 
 
 def _check_array(name: str, thing: Any) -> None:
-    """Refuses an empty array, and a path in its place, with the call that reads it."""
+    """Refuses an empty array, and a path or a data set of a library in its place, with the call that takes it."""
     if isinstance(thing, (str, os.PathLike)):
         raise InputError(f"{name}: expected an array, found a path; scene.add({os.fspath(thing)!r}) adds a file")
-    if np.shape(array_of(thing))[:1] == (0,):
+    adopted.check_array(name, thing)
+    if isinstance(thing, Mapping):
+        found = f"a mapping of {', '.join(map(str, thing)) or 'nothing'}"
+        raise InputError(f"{name}: expected an array, found {found}; `np.column_stack([x, y, z])` makes rows of columns")
+    shape = np.shape(array_of(thing, name))
+    if shape[:1] == (0,):
         raise InputError(f"{name}: expected one row or more, found none")
+    instead = {2: f"`np.column_stack([{name}, np.zeros(len({name}))])` lies in a plane", 3: f"`{name}.T` has rows of three"}
+    side = 3 if shape[:1] == (3,) else shape[-1] if shape else 0
+    if name != "faces" and len(shape) == 2 and shape[1] != 3 and side in instead:
+        raise InputError(f"{name}: expected the shape (n, 3), found {shape}; {instead[side]}")
 
 
 def _check_finite(name: str, thing: Any) -> None:
     """Refuses places or numbers that are not finite, with the first such row."""
-    array = array_of(thing)
+    array = array_of(thing, name)
     if np.ndim(array) not in (1, 2) or not np.issubdtype(array.dtype, np.floating):
         return
     # A sum is finite where all are, but for overflow.
@@ -1135,7 +1164,7 @@ def _check_finite(name: str, thing: Any) -> None:
 
 def _check_faces(faces: Any) -> None:
     """Refuses counts and indices as VTK has them, in one row or in one for each face."""
-    flat = array_of(faces)
+    flat = array_of(faces, "faces")
     # Five quads that all begin with vertex 3 are hardly meant.
     if np.ndim(flat) == 2 and flat.shape[1] == 4 and len(flat) >= 5 and (flat[:, 0] == 3).all():
         raise InputError("faces: expected the corners of each face, found 3 before those of each, as VTK counts them; give `faces[:, 1:]`")
@@ -1144,6 +1173,23 @@ def _check_faces(faces: Any) -> None:
     sides = next((sides for sides in (3, 4) if len(flat) % (sides + 1) == 0 and (flat[:: sides + 1] == sides).all()), None)
     if sides is not None:
         raise InputError(f"faces: expected the shape (m, {sides}), found counts and indices of VTK in one row; give `faces.reshape(-1, {sides + 1})[:, 1:]`")
+
+
+def _check_labels(numbers: np.ndarray) -> None:
+    """Refuses numbers that name no regions."""
+    is_float = numbers.dtype.kind == "f"
+    present = numbers[np.isfinite(numbers)] if is_float else numbers
+    odd = present[(present < -1) | (present != np.round(present))] if is_float else present[present < -1]
+    if odd.size:
+        raise InputError(f"values: expected whole numbers from 0 that name regions, or -1 for none, found {odd[0]:g}")
+    if not (present > 0).any():
+        raise InputError("values: expected a label other than 0 and -1, which are nothing, found none")
+
+
+def _axes(places: Any) -> dict[str, Any]:
+    """The columns that rows of coordinates have by themselves."""
+    is_of_places = np.ndim(places) == 2 and places.shape[1] == 3
+    return {axis: places[:, at] for at, axis in enumerate("xyz")} if is_of_places else {}
 
 
 def _check_look(transfer: Any, preset: Any) -> None:
@@ -1158,27 +1204,43 @@ def _check_look(transfer: Any, preset: Any) -> None:
 
 def _colors_by(
     column: str | None,
-    colormap: str | None,
-    clim: tuple[float, float] | None,
+    colormap: Any,
+    clim: Any,
     log_scale: bool,
     field: Any,
     transfer: Any,
+    numbers: Mapping[str, Any],
 ) -> tuple[Field | None, dict[str, Any]]:
-    """The field that points or a mesh show, and else the keys of the column that they are coloured by."""
+    """The field that points or a mesh show, and else the keys of the column that they are coloured by; ``numbers`` are those of known columns."""
+    log_scale = flag("log_scale", log_scale)
     if field is not None:
         if column is not None:
             raise InputError("field, color_by: expected one of them, found both")
         return field_of(field, {}, colormap, clim, transfer, log_scale), {}
-    keys = _shown(column, colormap, clim, log_scale)
-    if transfer is None:
-        return None, keys
-    if column is None:
+    if transfer is not None and column is None:
         raise InputError("transfer: expected a column or a field to colour by, found none; give `values`, `color_by` or `field`")
-    if colormap is not None or clim is not None:
+    if transfer is not None and (colormap is not None or clim is not None):
         raise InputError("transfer, colormap, clim: expected the colours of the column once, found them twice")
+    if transfer is None and not is_named(colormap):
+        if column is None or log_scale:
+            found = "none; give `values` or `color_by`" if column is None else "one with `log_scale`, which takes a map by its name"
+            raise InputError(f"colormap: expected a column to colour by, found {found}")
+        transfer = make_transfer(colormap, clim)
+        colormap = clim = None
+
+    def ends() -> tuple[float, float]:
+        if not isinstance(column, str) or column not in numbers:
+            raise InputError(f"clim: expected two numbers for the column {column!r}, which is none of the arrays, found {clim}")
+        shown = np.asarray(numbers[column], dtype=np.float64)
+        return percentiles(shown[shown > 0.0] if log_scale else shown, f"the column '{column}'", "a number to show")
+
+    stated = clim_of(clim)
+    # Without any end, drawing finds both.
+    clim = None if stated == (None, None) else filled(stated, ends)
+    keys = _shown(column, colormap, clim, log_scale)
     if isinstance(transfer, Transfer):
-        transfer = [{key: point[key] for key in ("value", "color")} for point in transfer.points]
-    return None, keys | {"transfer": transfer}
+        transfer = transfer.colors_over(filled(transfer.clim, ends))
+    return None, keys | ({} if transfer is None else {"transfer": transfer})
 
 
 def _up_of_file(thing: Mapping[str, Any]) -> str | None:
@@ -1199,6 +1261,28 @@ def _up_of_file(thing: Mapping[str, Any]) -> str | None:
         return None
 
 
+def _labels_of(labels: Any) -> Any:
+    """The labels of an object, whose colours are linear: the path of a table, or numbers with names or tables."""
+    expected = 'labels: expected whole numbers with their names, such as {1: "bone"}, or the path of a table'
+    if isinstance(labels, (str, os.PathLike)):
+        return labels
+    if not isinstance(labels, Mapping):
+        raise InputError(f"{expected}, found {kind_of(labels)}")
+    stated: dict[str, Any] = {}
+    for key, look in labels.items():
+        if str(key) != "table" and not re.fullmatch("[0-9]+", str(key)):
+            raise InputError(f"{expected}, found {key!r} in the place of a number")
+        has_color = isinstance(look, Mapping) and look.get("color") is not None
+        stated[str(key)] = {**look, "color": color_of(look["color"], f"labels, {key}, color")} if has_color else look
+    return stated
+
+
+def _without_colors(thing: dict[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys that a first scene has for labels, without the colours in whose place a user states labels."""
+    is_replaced = keys.get("labels") is not None and thing.get("color_by", {}).get("column") == "label"
+    return {key: value for key, value in thing.items() if not (is_replaced and key == "color_by")}
+
+
 def _missing_labels(labels: Any, numbers: np.ndarray) -> list[str]:
     """The labels of a table that no voxel has."""
     if not isinstance(labels, Mapping):
@@ -1212,6 +1296,8 @@ def _looks(thing: Mapping[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
     stated = dict(keys)
     if stated.get("color") is not None:
         stated["color"] = color_of(stated["color"])
+    if stated.get("labels") is not None:
+        stated["labels"] = _labels_of(stated["labels"])
     if any(source in thing for source in _SURFACES) and isinstance(stated.get("unlit"), bool):
         if stated.pop("unlit"):
             if stated.get("material") is not None:
@@ -1220,9 +1306,17 @@ def _looks(thing: Mapping[str, Any], keys: Mapping[str, Any]) -> dict[str, Any]:
     return stated
 
 
-def _diagonal(file: str) -> float:
-    """The diagonal of the volume of a file, in its unit."""
-    return float(np.linalg.norm(json.loads(_organza.info_of_file(file, _how()))["size"])) or 1.0
+def _diagonal(facts: str) -> float:
+    """The diagonal of the volume of a file, in its unit, from what is known of the file."""
+    return float(np.linalg.norm(json.loads(facts)["size"])) or 1.0
+
+
+def _ends_of_file(facts: str) -> tuple[float, float]:
+    """The 1st and the 99th percentile of the volume of a file; where both are one, the least and greatest; growing in any case."""
+    known = json.loads(facts)
+    shares = [value for _, value in known["quantiles"]]
+    low, high = (shares[0], shares[-1]) if shares and shares[0] < shares[-1] else known["range"]
+    return (low, high) if low < high else (low, low + max(abs(low), 1.0))
 
 
 def _switch(name: str, state: Any) -> str:
@@ -1247,16 +1341,16 @@ def _kind(thing: Any) -> str:
 
 def _label(name: Any) -> str | None:
     """The name of an object, where it has one."""
-    if name is not None and not isinstance(name, str):
-        raise InputError(f"name: expected a text, found {name!r}")
-    return name
+    return text("name", name, "a text")
 
 
-def _shown(column: str | None, colormap: str | None, clim: tuple[float, float] | None, log_scale: bool) -> dict[str, Any]:
+def _shown(column: str | None, colormap: str | None, clim: Any, log_scale: bool) -> dict[str, Any]:
     """The keys of an object whose colours stand for a column."""
     if column is not None and not isinstance(column, (str, Mapping)):
         raise InputError(f"color_by: expected the name of a column, found {_kind(column)}; `values` takes its numbers, and `field` a volume")
     if isinstance(column, Mapping):
+        if colormap is not None or clim is not None or log_scale:
+            raise InputError("colormap, clim, log_scale: expected the keys `map`, `range` and `scale` in the table of `color_by`, found both")
         return {"color_by": column}
     if column is None:
         if colormap is not None or clim is not None or log_scale:

@@ -12,6 +12,7 @@ from organza.checking import named
 from organza.drawing import _how, _wished, unused_goal, warn
 from organza.progressing import heard
 from organza.scene import scene_of
+from organza.values import whole
 
 
 class View:
@@ -95,6 +96,7 @@ def view(
     -------
     View
     """
+    side = whole("height", height, "pixels") or 1
     wished = _wished(size, preset, color_by, up, ground, azimuth, elevation, fit)
     paths = [Path(os.fspath(thing)).name for thing in what if isinstance(thing, (str, os.PathLike))]
     title = ", ".join(paths) or "scene"
@@ -102,4 +104,4 @@ def view(
         how = _how(None, max_memory, told, drop_invalid, strict)
         given = scene_of(what, wished, how)._given(how, effects, size)
         warn(unused_goal(given, how, "organza.view"))
-        return View(_organza.view(given, title, how), height)
+        return View(_organza.view(given, title, how), side)
