@@ -189,6 +189,19 @@ def test_a_transfer_function_without_ends_has_those_of_the_data():
     assert [shown_by(flat)["transfer"][rank]["value"] for rank in (0, -1)] == [0.0, 1.0]
 
 
+def test_a_map_that_diverges_has_zero_in_its_middle():
+    signed = CUBE - 100
+    farther = max(-np.percentile(signed, 1), np.percentile(signed, 99))
+    slices = og.Scene()
+    slices.add_slice(signed, colormap="coolwarm")
+    slices.add_volume(signed, transfer=og.transfer("coolwarm"))
+    for thing in slices._document["object"]:
+        assert [thing["transfer"][rank]["value"] for rank in (0, -1)] == pytest.approx([-farther, farther])
+    stated = og.Scene()
+    stated.add_slice(signed, colormap="coolwarm", clim=(None, 50))
+    assert shown_by(stated)["transfer"][0]["value"] == pytest.approx(np.percentile(signed, 1))
+
+
 def test_a_transfer_function_without_ends_has_those_of_a_file():
     dose = str(ASSETS / "dose" / "dose.nrrd")
     shares = dict(map(tuple, og.info(dose)["quantiles"]))

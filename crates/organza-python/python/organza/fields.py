@@ -11,7 +11,7 @@ import numpy as np
 
 from organza._organza import Data, InputError
 from organza.arrays import array_of
-from organza.lattices import filled, lattice_of, percentiles, volume_arguments
+from organza.lattices import lattice_of, percentiles, volume_arguments
 from organza.transfers import Transfer
 from organza.transfers import transfer as make_transfer
 
@@ -70,4 +70,4 @@ def field_of(
     if values is None and None in colors.clim:
         ends = "none" if clim is None else clim
         raise InputError(f"clim: expected the values at the ends of the map for the field of a file, which is not read yet, found {ends}")
-    return Field(data, table, {"transfer": colors.colors_over(filled(colors.clim, lambda: percentiles(values, "field")))})
+    return Field(data, table, {"transfer": colors.colors_over(colors.ends(lambda: percentiles(values, "field")))})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,6 @@ import numpy as np
 from organza import adopted
 from organza._organza import Data, InputError
 from organza.arrays import array_of, finite_steps
-from organza.transfers import Ends
 from organza.values import place_of
 
 
@@ -106,18 +104,6 @@ def volume_arguments(values: Any, spacing: Any, origin: Any, direction: Any, nam
         raise InputError(f"spacing: expected steps above 0, found {spacing!r}; `direction` turns an axis, and `values[::-1]` its order")
     transform = arguments.pop("transform", None)
     return arguments, {} if transform is None else {"transform": transform}
-
-
-def filled(clim: Ends, found: Callable[[], tuple[float, float]]) -> tuple[float, float]:
-    """The ends of a map, of which those that are not stated are found."""
-    low, high = clim
-    if low is not None and high is not None:
-        return low, high
-    least, greatest = found()
-    ends = (least if low is None else low, greatest if high is None else high)
-    if not ends[0] < ends[1]:
-        raise InputError(f"clim: expected two growing numbers, found {clim}, and {least:g} to {greatest:g} in the data")
-    return ends
 
 
 def percentiles(values: Any, name: str = "values", what: str = "a voxel with a value") -> tuple[float, float]:

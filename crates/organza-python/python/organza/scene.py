@@ -20,7 +20,7 @@ from organza._organza import Data, InputError
 from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, plain, radii_of, texture_of
 from organza.checking import check_keys, meant, of_object
 from organza.fields import Field, field_of
-from organza.lattices import check_level, check_plane, filled, lattice_of, percentiles, volume_arguments
+from organza.lattices import check_level, check_plane, lattice_of, percentiles, volume_arguments
 from organza.paths import path_in
 from organza.placing import Camera, Light, beyond
 from organza.transfers import Transfer, clim_of, is_named
@@ -362,7 +362,7 @@ class Scene:
         data, lattice = lattice_of(**arguments)
         source = "volume"
         if transfer is not None:
-            ends = filled(transfer.clim, lambda: percentiles(arguments["values"]))
+            ends = transfer.ends(lambda: percentiles(arguments["values"]))
             keys = transfer.keys(lattice.diagonal or 1.0, ends) | keys
             if "material" not in keys:
                 # As first scenes have it: lit by its gradients, so that its shape is seen.
@@ -502,7 +502,7 @@ class Scene:
         table["center"] = place_of("center", center)
         if not is_file:
             check_plane(table["center"], across, lattice.corners)
-        points = colors.colors_over(filled(colors.clim, lambda: percentiles(arguments["values"])))
+        points = colors.colors_over(colors.ends(lambda: percentiles(arguments["values"])))
         if "material" not in keys:
             keys = {"material": _UNLIT_SLICE} | keys
         keys = standing | {"transfer": points} | keys
@@ -980,7 +980,7 @@ class Scene:
                 if source != "volume":
                     raise InputError(f"transfer: expected a volume of amounts, found {source}: {file}; leave it out")
                 facts = _organza.info_of_file(file, _how())
-                thing |= transfer.keys(_diagonal(facts), filled(transfer.clim, functools.partial(_ends_of_file, facts)))
+                thing |= transfer.keys(_diagonal(facts), transfer.ends(functools.partial(_ends_of_file, facts)))
             if stated:
                 if "color_by" not in thing | dict(keys):
                     raise InputError(f"colormap, clim, log_scale: expected a column to colour by, found none in {source}: {file}; give `color_by`")
@@ -1236,10 +1236,10 @@ def _colors_by(
 
     stated = clim_of(clim)
     # Without any end, drawing finds both.
-    clim = None if stated == (None, None) else filled(stated, ends)
+    clim = None if stated == (None, None) else make_transfer(clim=stated).ends(ends)
     keys = _shown(column, colormap, clim, log_scale)
     if isinstance(transfer, Transfer):
-        transfer = transfer.colors_over(filled(transfer.clim, ends))
+        transfer = transfer.colors_over(transfer.ends(ends))
     return None, keys | ({} if transfer is None else {"transfer": transfer})
 
 

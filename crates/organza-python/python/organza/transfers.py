@@ -17,6 +17,8 @@ from organza.values import HEX_COLOR, kind_of, number, parts_of
 _COLORS = 33
 # The same of a map of matplotlib, which may have steps.
 _COLORS_OF_OTHERS = 256
+# Maps whose middle is 0 where numbers have both signs.
+_DIVERGING = ("coolwarm",)
 # A scene takes opacities below 1.
 _MOST_OPAQUE = 0.9999
 # Parts of a volume's diagonal over which opacities count, where nothing else is said.
@@ -41,12 +43,28 @@ class Transfer:
     """Colours and opacities by their place between the ends, 0 to 1."""
     clim: Ends
     unit_length: float | None
+    is_diverging: bool
+    """Whether the middle of the map is that of numbers with both signs."""
 
     @property
     def points(self) -> list[dict[str, Any]]:
         """Colours and opacities by value, from 0 to 1 where the data has to tell the ends."""
         low, high = self.clim
         return self.points_over((0.0, 1.0) if low is None or high is None else (low, high))
+
+    def ends(self, found: Callable[[], tuple[float, float]]) -> tuple[float, float]:
+        """The values at the ends of the map, of which those that are not stated are found in the data; those of a map that diverges lie as far from 0."""
+        low, high = self.clim
+        if low is not None and high is not None:
+            return low, high
+        least, greatest = found()
+        if self.is_diverging and low is None and high is None and least < 0.0 < greatest:
+            farther = max(-least, greatest)
+            return -farther, farther
+        ends = (least if low is None else low, greatest if high is None else high)
+        if not ends[0] < ends[1]:
+            raise InputError(f"clim: expected two growing numbers, found {self.clim}, and {least:g} to {greatest:g} in the data")
+        return ends
 
     def points_over(self, ends: tuple[float, float]) -> list[dict[str, Any]]:
         """Colours and opacities by value between two ends."""
@@ -79,7 +97,8 @@ def transfer(
         a list of colours ``"#rrggbb"``.
     clim
         The values of the first and the last colour. Values beyond have the colour and the opacity of the nearest end. In the place of None, of both or of
-        one of them, stands the 1st and the 99th percentile of the data that shows it.
+        one of them, stands the 1st and the 99th percentile of the data that shows it; of ``coolwarm`` and values with both signs, as far from 0 as the farther
+        of these.
     opacity
         Numbers from 0 to 1, evenly spaced over ``clim``: the opacity of ``unit_length`` of such values.
     unit_length
@@ -112,7 +131,8 @@ def transfer(
         part = place * last - below
         opaque = opacities[below] + (opacities[below + 1] - opacities[below]) * part
         knots.append({"place": place, "color": color, "opacity": min(opaque, _MOST_OPAQUE)})
-    return Transfer(tuple(knots), ends, None if unit_length is None else number("unit_length", unit_length))
+    length = None if unit_length is None else number("unit_length", unit_length)
+    return Transfer(tuple(knots), ends, length, isinstance(colormap, str) and colormap in _DIVERGING)
 
 
 def clim_of(clim: Any) -> Ends:
