@@ -155,6 +155,26 @@ def test_points_have_their_columns_and_colours():
         og.render(scene, size=SMALL)
 
 
+def test_points_that_lie_on_no_surface_are_balls():
+    places = np.random.default_rng(5).random((2000, 3))
+
+    def drawn(places, **keys):
+        scene = og.Scene()
+        scene.add_points(places, name="gas", **keys)
+        scene.camera(position=(0.5, 0.5, 4), target=(0.5, 0.5, 0.5))
+        scene.light(direction=(-1, -2, -1), irradiance=(3, 3, 3))
+        return og.render(scene, size=SMALL)
+
+    picture = drawn(places)
+    assert any("lie on no surface" in note and '`discs="round"`' in note for note in picture.notes), picture.notes
+    assert np.array_equal(picture.rgb, drawn(places, discs="balls").rgb)
+    assert not np.array_equal(picture.rgb, drawn(places, discs="round").rgb)
+    # Balls have the radius that is said.
+    assert drawn(places, radius=0.005).alpha.mean() < 0.7 * drawn(places, radius=0.02).alpha.mean()
+    flat = drawn(places * (1, 1, 0))
+    assert not any("surface" in note for note in flat.notes), flat.notes
+
+
 def test_a_scene_is_pickled_with_its_data():
     vertices, faces = tetrahedron()
     scene = volume_scene(ball(9), name="fog", spacing=(1, 1, 2), direction=np.eye(3)[[1, 0, 2]])

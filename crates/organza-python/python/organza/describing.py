@@ -96,6 +96,10 @@ def explain(
         The document of ``organza explain --json``: ``plan``, ``predicted``, ``cost``, ``measured``, ``memory_bytes``, ``splats``, ``warnings``, ``notes``,
         ``camera``, ``up``, ``scene``.
 
+        ``plan`` has ``effects``, ``estimates`` of what techniques err by, ``compared``: what ``technique = "auto"`` weighed for each ``object``, or for all of
+        them together (None), ``drawn_by``, with ``displayed_error`` (None where it is not known), ``seconds`` of one core, ``taken`` and ``reason``; and
+        ``settings`` and ``passes``.
+
         ``predicted`` has ``seconds`` on the ``threads`` of this machine and ``seconds_of_one_core``, the source of its rates (``by``), ``passes`` with their
         ``counts``, the sentence that a long drawing begins with (``announcement``, or None), and ``effects``: for each that runs passes of its own ``name``,
         ``seconds``, ``bytes`` and ``passes``.

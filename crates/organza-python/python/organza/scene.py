@@ -150,7 +150,8 @@ class Scene:
         normals
             (n, 3); found from neighbours where there are none.
         radius
-            (n,) or one number: the radius of a point's disc, in the unit of the positions; found from neighbours where it is None.
+            (n,) or one number: the radius of a point's disc or ball, in the unit of the positions; found from neighbours where it is None. Opaque points without
+            normals are balls where most of them lie on no surface, as particles of a simulation do; ``discs="balls"`` and ``"round"`` say so or not.
         values
             (n,): a column that ``color_by="value"`` shows. Light changes its colours: ``unlit=True`` shows those of the legend.
         opacities
@@ -172,7 +173,7 @@ class Scene:
         name
             How the object is called; no other object of the scene may have the name.
         **keys
-            Further keys of an object (docs/scene.md), such as ``opacity``, ``material``, ``technique``, ``unlit``.
+            Further keys of an object (docs/scene.md), such as ``opacity``, ``material``, ``technique``, ``unlit``, ``discs``.
 
         Raises
         ------

@@ -45,7 +45,7 @@ pub(crate) fn settled<'s>(scene: Cow<'s, Scene>, context: Context<'_>) -> Result
         } else {
             let needed = if way.carries_light { bytes(&scene, &facts, way) } else { 0 };
             let limit = context.options.max_memory;
-            (needed > limit).then(|| format!("it needs {needed} bytes, the limit is {limit}"))
+            (needed > limit).then(|| format!("it needs {needed} bytes, the limit is {limit} bytes"))
         };
     }
     let Some(way) = chosen(&ways, scene.render.tolerance) else {
@@ -496,6 +496,43 @@ mod tests {
         let effects =
             settled_with(&[VIEW, CLOUD, "[render]\nlayers = ['effects']\n"].concat(), &RenderOptions::default());
         assert!(effects.unwrap().render.layers.names().any(|name| name == SCATTERED));
+    }
+
+    #[test]
+    fn what_was_compared_is_told_with_what_was_taken_and_why() {
+        let compared = |parts: &[&str], options: &RenderOptions| {
+            let scene = settled_with(&(VIEW.to_owned() + &parts.concat()), options).unwrap();
+            scene.render.choice.clone().unwrap()
+        };
+        let usual = RenderOptions::default();
+        // A cloud that scatters again and again, by each technique alone, and by the one that shows it.
+        let of_cloud = compared(&[CLOUD, WALL], &usual);
+        let taken: Vec<&ComparedTechnique> = of_cloud.iter().filter(|one| one.is_taken).collect();
+        assert_eq!(taken.len(), 1, "{of_cloud:?}");
+        assert_eq!(taken[0].drawn_by, "sheets, which scatter light again and again");
+        let rival = of_cloud.iter().find(|one| one.drawn_by == "points").unwrap();
+        assert!(rival.displayed_error > taken[0].displayed_error && rival.seconds > 0.0, "{of_cloud:?}");
+        assert!(rival.reason.contains("errs"), "{}", rival.reason);
+        // Objects by themselves: glass by what bends light, the wall by the only one.
+        let of_glass = compared(&[GLASS, WALL], &usual);
+        assert!(of_glass.iter().all(|one| one.object.as_deref() == Some("glass")), "{of_glass:?}");
+        let told: Vec<(&str, bool, &str)> =
+            of_glass.iter().map(|one| (one.drawn_by.as_str(), one.is_taken, one.reason.as_str())).collect();
+        assert!(told.contains(&("surfels", true, "the fastest that errs within the tolerance")), "{told:?}");
+        assert!(told.contains(&("points", false, "what it errs by is not known")), "{told:?}");
+        // What cannot be taken says so.
+        let small = RenderOptions { max_memory: 1 << 20, ..RenderOptions::default() };
+        let of_small = compared(&[CLOUD], &small);
+        assert!(
+            of_small.iter().any(|one| !one.is_taken && one.reason.contains("the limit is 1048576")),
+            "{of_small:?}"
+        );
+        let off = "[render]\neffects = { scatter = 'off' }\n";
+        let switched = compared(&[CLOUD, off], &usual);
+        assert!(switched.iter().any(|one| one.reason == "the scene switches `scatter` off"), "{switched:?}");
+        // A scene that names its techniques compares nothing.
+        let named = settled_with(&(VIEW.to_owned() + CLOUD + "[render]\ntechnique = 'points'\n"), &usual).unwrap();
+        assert_eq!(named.render.choice, None);
     }
 
     #[test]
