@@ -12,7 +12,7 @@ pub(crate) const MADE: &str = "scene.json";
 const MARK: &str = "memory:";
 
 /// Words of a command line, and those of Python; longer ones come before those that they contain.
-const WORDS: [(&str, &str); 63] = [
+const WORDS: [(&str, &str); 64] = [
     ("move or strengthen a [[light]], or add [ambient]", "move or strengthen a light, or set ambient.color"),
     (
         "add a [[light]], a `color` in [ambient], or a material with `emission` or shading = \"unlit\"",
@@ -92,6 +92,10 @@ const WORDS: [(&str, &str); 63] = [
     ("--preset mri", "`preset=\"mri\"`"),
     ("(--max-memory)", "(`max_memory`)"),
     ("(--merge-duplicates)", "(`merge_duplicates=True` makes them one)"),
+    (
+        "only a program that hands its data over can name it so",
+        "add the arrays of that name, or pickle the scene, which keeps them",
+    ),
     ("discs = \"round\"", "`discs=\"round\"`"),
     ("--max-memory", "`max_memory`"),
     ("--drop-invalid", "`drop_invalid=True`"),

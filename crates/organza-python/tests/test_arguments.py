@@ -29,7 +29,17 @@ def mesh_of_vtk():
     return pytest.importorskip("pyvista").Sphere(theta_resolution=8, phi_resolution=8)
 
 
+LABELS = np.where(np.indices((6, 6, 6)).sum(0) > 8, 2**24 + 1, 0)
+
 REFUSED = {
+    "a volume of nearly one number": (lambda: og.Scene().add_volume(1e9 + CUBE), r"values: expected values that single precision tells apart, .*`values - 1e\+09`"),
+    "an isosurface of such": (lambda: og.Scene().add_isosurface(1e6 + 0.001 * CUBE, 1e6), "values: .*single precision"),
+    "a column twice": (lambda: points(values=VALUES, columns={"value": VALUES}), "values, columns: expected the column `value` once"),
+    "labels that are too large": (lambda: og.Scene().add_labels(LABELS), "values: expected labels of at most 16777216, found 16777217; .*return_inverse"),
+    "an empty path": (lambda: og.Scene().add(""), "thing: expected the path of a file, found an empty text"),
+    "an empty path to draw": (lambda: og.render(""), "what: expected the path of a file, found an empty text"),
+    "a picture wider than any": (lambda: og.render(PLACES, size=(10**10, 10)), "size: expected 1 to 65536 pixels a side"),
+    "no length": (lambda: og.transfer(unit_length=0), "unit_length: expected a length above 0, found 0"),
     "a ragged list": (lambda: og.Scene().add_points([[1, 2, 3], [4, 5, 6], [7, 8]]), r"positions: expected an array of numbers, found rows of other lengths: 3 numbers in row 0, 2 numbers in row 2"),
     "a ragged volume": (lambda: og.Scene().add_volume([[[1, 2], [3]]]), r"values: .*2 numbers in row 0, 1 number in row 1"),
     "ragged faces": (lambda: og.Scene().add_mesh(np.eye(3), [[0, 1, 2], [0, 1, 2, 0]]), "faces: .*3 numbers in row 0, 4 numbers in row 1"),
@@ -344,3 +354,33 @@ def test_every_argument_is_refused_by_its_name(call):
                 assert name in str(error), f"{name}={odd!r}: {error}"
             except FileNotFoundError:
                 assert isinstance(odd, str)
+
+
+def test_values_beside_a_large_number_keep_their_differences():
+    """Times of Unix differ by less than single precision tells apart."""
+    offsets = np.arange(40.0)
+    near = points(values=offsets, unlit=True, discs="round")
+    far = points(values=1.7e9 + offsets, unlit=True, discs="round")
+    assert np.abs(og.render(near, size=SMALL).rgb - og.render(far, size=SMALL).rgb).max() < 1e-3
+
+
+def test_an_array_of_xarray_that_runs_from_north_to_south_is_that_which_runs_north():
+    xarray = pytest.importorskip("xarray")
+    places = {"z": np.arange(6.0), "lat": np.linspace(60.0, 50.0, 6), "lon": np.arange(6.0)}
+    southwards = xarray.DataArray(CUBE, dims=("z", "lat", "lon"), coords=places)
+    pictures = []
+    for array in (southwards, southwards.sortby("lat")):
+        scene = og.Scene()
+        scene.add(array, transform={"up": "z"})
+        pictures.append(og.render(scene, size=SMALL).rgb)
+    assert np.array_equal(*pictures)
+
+
+def test_a_layer_is_asked_for_by_its_name():
+    with pytest.raises(KeyError, match="expected the name of a layer"):
+        og.render(PLACES, size=SMALL)[0]
+
+
+def test_a_wish_that_there_is_not_is_named_with_the_one_that_may_be_meant():
+    with pytest.raises(TypeError, match=r"from_files: .*found `colour_by`; did you mean `color_by`\?"):
+        og.Scene.from_files(ASSETS / "meshes" / "dart.off", colour_by="x")

@@ -286,6 +286,8 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
         }
         Reading::Amounts => None,
     };
+    let said_of_one_value =
+        (range[0] == range[1]).then(|| format!("every voxel has the value {}, so it shows as a box", range[0]));
     let labels = reading.labels();
     let fine = wide.map(|range| Histogram::new(&grid.values, range, FINE_BINS));
     Facts {
@@ -300,6 +302,7 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
             .flatten()
             .take(1)
             .chain(said_of_labels)
+            .chain(said_of_one_value)
             .collect(),
         labels: labels.map_or_else(Vec::new, |labels| label_facts(grid, &labels, table.map(|named| &named.table))),
         quantiles: fine.iter().flat_map(|f| SHARES.map(|share| (share, f.quantile(share)))).collect(),
@@ -346,6 +349,17 @@ mod tests {
         assert_eq!(facts.bounds, Some(DAabb::new(DVec3::new(0.0, 1.0, 1.0), DVec3::new(1.0, 3.0, 1.0))));
         assert_eq!(facts.range, Some([-1.0, 3.0]));
         assert_eq!(facts.histogram.map(|h| h.total()), Some(4));
+    }
+
+    #[test]
+    fn a_volume_of_one_value_says_that_it_shows_as_a_box() {
+        let of_values = |values: Vec<f32>| {
+            let axes = DMat3::IDENTITY;
+            of_grid(&Grid { origin: DVec3::ZERO, axes, dims: [2, 2, 1], values }, None).remarks
+        };
+        assert_eq!(of_values(vec![0.0; 4]), ["every voxel has the value 0, so it shows as a box"]);
+        let told = of_values(vec![0.0, 0.25, 0.0, 0.75]);
+        assert!(told.iter().all(|remark| !remark.contains("box")), "{told:?}");
     }
 
     #[test]

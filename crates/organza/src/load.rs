@@ -226,6 +226,8 @@ pub(crate) fn read<'a>(
     let loading = Loading { scene, context };
     let lights = lights(scene);
     context.files.scales.take();
+    // Whoever placed the camera and chose the techniques has read files already.
+    let read_before = context.files.take_seconds();
     let (prepared, images) = cost.measure(pass::READ, |stage| {
         let prepared = loading.prepare(looks, beside)?;
         let images = loading.images(&lights)?;
@@ -236,6 +238,10 @@ pub(crate) fn read<'a>(
         stage.bytes = of_objects + 2 * images.bytes();
         Ok::<_, Error>((prepared, images))
     })?;
+    context.files.take_seconds();
+    if let Some(stage) = cost.stages.last_mut() {
+        stage.seconds += read_before;
+    }
     let statistics = loading.statistics(&prepared);
     let facts = source_facts(scene, context)?;
     Ok(Inputs { loading, prepared, images, lights, warnings: context.files.mended(), statistics, facts })

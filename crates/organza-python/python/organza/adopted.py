@@ -352,6 +352,10 @@ def _xarray(thing: Any) -> tuple[str, str, dict[str, Any]] | None:
     spacing, origin = [], []
     for dim in reversed(thing.dims):
         places = _places_along(thing, dim)
+        if len(places) > 1 and places[0] > places[-1]:
+            # From north to south, or from the top down.
+            thing = thing.isel({dim: slice(None, None, -1)})
+            places = places[::-1]
         steps = np.diff(places)
         if len(steps) and not np.allclose(steps, steps[0], rtol=1e-3):
             raise InputError(f"the coordinate {dim}: expected even steps, found {steps.min()} to {steps.max()}; interpolate it first")

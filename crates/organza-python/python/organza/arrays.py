@@ -18,6 +18,8 @@ from organza.values import HEX_COLOR, kind_of, parts_of
 _MOST_OF_A_BYTE = 255
 # Times white that a colour may be before most such colours are taken for bytes.
 _BRIGHTEST = 16
+# Whole numbers up to this one are exact in single precision.
+_MOST_EXACT = 2**24
 # Bytes of the longest float that the extension takes.
 _LONGEST_FLOAT = 8
 
@@ -104,6 +106,20 @@ def colors_of(thing: Any, name: str = "colors") -> Any:
     return array.astype(np.float32 if high <= 1 else np.uint8)
 
 
+def is_told_apart(values: Any) -> bool:
+    """Whether single precision, in which volumes and the values of points are kept, has 256 steps or more between the least and the largest value."""
+    if values.dtype.kind not in "iuf" or values.dtype.itemsize <= (4 if values.dtype.kind == "f" else 2):
+        return True
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return True
+    low, high = float(finite.min()), float(finite.max())
+    step = float(np.finfo(np.float32).eps) * max(abs(low), abs(high))
+    # Of whole numbers that single precision has exactly none is lost.
+    is_exact = values.dtype.kind in "iu" and max(abs(low), abs(high)) <= _MOST_EXACT
+    return low == high or is_exact or high - low >= 256.0 * step
+
+
 def columns_of(columns: Any) -> dict[str, Any]:
     """Columns by name, of a mapping or of a table that has them."""
     if columns is None:
@@ -112,7 +128,12 @@ def columns_of(columns: Any) -> dict[str, Any]:
     if not isinstance(columns, Mapping) and not (hasattr(columns, "items") and hasattr(columns, "columns")):
         found = f"{kind_of(columns)}; `values` takes one column without a name" if hasattr(columns, "__len__") else kind_of(columns)
         raise InputError(f"columns: expected arrays by name, such as {{\"temperature\": array}}, found {found}")
-    return {str(name): array_of(values, f"columns, '{name}'") for name, values in columns.items()}
+    named: dict[str, Any] = {}
+    for name, values in columns.items():
+        if str(name) in named:
+            raise InputError(f"columns: expected each name once, found '{name}' twice")
+        named[str(name)] = array_of(values, f"columns, '{name}'")
+    return named
 
 
 def halved_quads(rows: np.ndarray) -> np.ndarray:

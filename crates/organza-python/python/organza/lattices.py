@@ -9,7 +9,7 @@ import numpy as np
 
 from organza import adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of, finite_steps
+from organza.arrays import is_told_apart, array_of, finite_steps
 from organza.values import place_of
 
 
@@ -34,6 +34,9 @@ def lattice_of(
         raise InputError(f"{name}: expected the shape (nz, ny, nx), found {np.shape(grid)}{part}")
     if not grid.size:
         raise InputError(f"{name}: expected a volume with voxels, found the shape {grid.shape}")
+    if not is_told_apart(grid):
+        low = float(np.nanmin(grid))
+        raise InputError(f"{name}: expected values that single precision tells apart, found some that differ by little beside {low:g}; `{name} - {low:g}` does")
     steps = np.broadcast_to(steps, (3,))
     turn = np.eye(3) if direction is None else _directions(direction)
     first = np.array(place_of("origin", origin))
@@ -69,7 +72,7 @@ def check_level(level: float, values: Any) -> None:
     """Refuses a level that no surface of the values has."""
     low, high = _ends(values)
     if not low <= level <= high:
-        raise InputError(f"level: expected a value of the volume, found {level:g}: level {level:g} lies outside the values {low:g} to {high:g}")
+        raise InputError(f"level: expected a value of the volume, which are {low:g} to {high:g}, found {level:g}")
 
 
 def check_plane(center: list[float], normal: list[float], corners: np.ndarray) -> None:

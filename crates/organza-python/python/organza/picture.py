@@ -56,6 +56,8 @@ class Picture:
         KeyError
             For a layer that the picture has not.
         """
+        if not isinstance(name, str):
+            raise KeyError(f"expected the name of a layer, such as {self.layers[0]!r}, found {name!r}")
         layer, _, channel = name.rpartition(".")
         if layer in self.layers and channel in ("R", "G", "B"):
             return np.ascontiguousarray(self._drawn.layer(layer)[..., "RGB".index(channel)])

@@ -17,7 +17,7 @@ import numpy as np
 
 from organza import _organza, adopted
 from organza._organza import Data, InputError
-from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, plain, radii_of, texture_of
+from organza.arrays import array_of, color_of, colors_of, columns_of, halved_quads, is_told_apart, plain, radii_of, texture_of
 from organza.checking import check_keys, meant, of_object
 from organza.fields import Field, field_of
 from organza.lattices import check_level, check_plane, lattice_of, percentiles, volume_arguments
@@ -28,6 +28,8 @@ from organza.transfers import transfer as make_transfer
 from organza.values import flag, kind_of, number, place_of, sides_of, text
 
 _DEFAULT_SIZE = (960, 540)
+# The largest label: whole numbers up to it are exact in single precision.
+_MOST_LABELS = 2**24
 # The material of slices that name none: the colours of their map, as they are.
 _UNLIT_SLICE = "unlit slice"
 # The material of volumes that name none.
@@ -115,6 +117,10 @@ class Scene:
     @classmethod
     def from_files(cls, *paths: str | os.PathLike[str], **wishes: Any) -> Scene:
         """A first scene of data files, as ``organza init`` writes it; ``wishes`` are those of :func:`organza.render`: ``preset``, ``color_by``, ``up`` …"""
+        known = [wish for wish in _no_wish() if wish != "turntable"]
+        for wish in wishes:
+            if wish not in known:
+                raise TypeError(f"from_files: expected one of {', '.join(known)}, found `{wish}`{meant(wish, known)}")
         return scene_of(paths, _no_wish() | wishes, _how())
 
     # Data.
@@ -191,12 +197,18 @@ class Scene:
             held["radius"] = radii_of(radius, len(positions))
         places = array_of(positions, "positions")
         shown_values = array_of(values, "values")
+        if values is not None and "value" in held:
+            raise InputError("values, columns: expected the column `value` once, found both; name it otherwise in `columns`")
+        if np.ndim(shown_values) == 1 and not is_told_apart(shown_values):
+            # A column has double precision.
+            held["value"] = shown_values
+            shown_values = None
         data = Data.points(
             places, array_of(normals, "normals"), colors_of(colors), array_of(opacities, "opacities"), shown_values, held
         )
         if color_by is None and values is not None and colors is None and field is None:
             color_by = "value"
-        numbers = _axes(places) | held | ({} if values is None else {"value": shown_values})
+        numbers = _axes(places) | held | ({} if shown_values is None else {"value": shown_values})
         shown, colors_by = _colors_by(color_by, colormap, clim, log_scale, field, transfer, numbers)
         keys = colors_by | keys
         self._add("points", data, name, keys, field=shown)
@@ -608,7 +620,7 @@ class Scene:
             Further keys of an object, and of a data set or an array the further arguments of :meth:`add_points`, :meth:`add_mesh` or :meth:`add_volume`.
         """
         if isinstance(thing, (str, os.PathLike)):
-            label = name or Path(thing).name
+            label = name or Path(_path("thing", thing)).name
             text("up", up, "'y', 'z' or '-y'")
             check_keys(Scene.add, label, keys)
             _check_look(transfer, preset)
@@ -1083,6 +1095,14 @@ class Scene:
         return document | {"object": things, "camera": stated}
 
 
+def _path(name: str, thing: str | os.PathLike[str]) -> str:
+    """The path of a file; an empty one would be the working directory."""
+    path = os.fspath(thing)
+    if not path:
+        raise InputError(f"{name}: expected the path of a file, found an empty text")
+    return path
+
+
 def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, Any]) -> Scene:
     """A scene, or the first scene of files and data."""
     if not what:
@@ -1099,7 +1119,7 @@ def scene_of(what: tuple[Any, ...], wished: Mapping[str, Any], how: dict[str, An
         if isinstance(thing, Scene) or _is_scene(thing):
             raise InputError(f"what: expected one scene, or files and data, found a scene among {len(what)}")
         if isinstance(thing, (str, os.PathLike)):
-            shown.append(os.path.abspath(thing))
+            shown.append(os.path.abspath(_path("what", thing)))
             continue
         found = adopted.data_of(thing)
         name = _free(found.name, data_by_name)
@@ -1179,6 +1199,8 @@ def _check_faces(faces: Any) -> None:
 def _check_labels(numbers: np.ndarray) -> None:
     """Refuses numbers that name no regions."""
     is_float = numbers.dtype.kind == "f"
+    if numbers.size and np.nanmax(numbers) > _MOST_LABELS:
+        raise InputError(f"values: expected labels of at most {_MOST_LABELS}, found {int(np.nanmax(numbers))}; `np.unique(values, return_inverse=True)` counts them anew")
     present = numbers[np.isfinite(numbers)] if is_float else numbers
     odd = present[(present < -1) | (present != np.round(present))] if is_float else present[present < -1]
     if odd.size:

@@ -132,6 +132,8 @@ def transfer(
         opaque = opacities[below] + (opacities[below + 1] - opacities[below]) * part
         knots.append({"place": place, "color": color, "opacity": min(opaque, _MOST_OPAQUE)})
     length = None if unit_length is None else number("unit_length", unit_length)
+    if length is not None and length <= 0.0:
+        raise InputError(f"unit_length: expected a length above 0, found {unit_length!r}")
     return Transfer(tuple(knots), ends, length, isinstance(colormap, str) and colormap in _DIVERGING)
 
 

@@ -13,6 +13,8 @@ from organza._organza import InputError
 
 # More than any picture, machine or film has, and exact as a number with a point.
 _MOST = 2**53
+# The most that scenes take.
+_MOST_PIXELS = 65536
 HEX_COLOR = re.compile("#[0-9a-fA-F]{6}")
 
 
@@ -73,6 +75,8 @@ def sides_of(size: Any) -> tuple[int, int] | None:
     sides = [whole("size", side) for side in parts_of(size)]
     if len(sides) != 2:
         raise InputError(f"size: expected a width and a height, found {size!r}")
+    if any(side is not None and side > _MOST_PIXELS for side in sides):
+        raise InputError(f"size: expected 1 to {_MOST_PIXELS} pixels a side, found {size!r}")
     return sides[0] or 1, sides[1] or 1
 
 

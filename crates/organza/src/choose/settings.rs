@@ -44,7 +44,10 @@ fn why(plan: &Plan) -> String {
             let compared: Vec<String> = compared.iter().filter(is_of_whole).map(weight).collect();
             format!("{}, of one core and about: {}", taken.reason, compared.join("; "))
         }
-        (None, []) => "no other technique draws its objects better".to_owned(),
+        (None, []) => {
+            "nothing else is weighed for its objects: other techniques draw them where they are asked for by name"
+                .to_owned()
+        }
         (None, [first, ..]) if plan.compared.iter().all(|one| one.object == first.object) => {
             let compared: Vec<String> = plan.compared.iter().map(weight).collect();
             let reason = plan.compared.iter().find(|one| one.is_taken).map_or("", |one| &one.reason);

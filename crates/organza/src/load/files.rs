@@ -10,6 +10,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 /// What was read of a file, what there is to say of it, and the memory that it takes as long as anybody has it from here.
 type Read = (SourceData, Notes, Arc<Reservation>);
@@ -30,6 +31,8 @@ pub struct Files {
     read: RefCell<HashMap<(PathBuf, u64), (ReadParams, Read)>>,
     /// Data that a program has in memory, beside what drawing takes of it.
     taken: RefCell<Vec<(SourceData, Read)>>,
+    /// Seconds that reading took since a cost record took them.
+    seconds: Cell<f64>,
     /// What there is to say of them, one sentence each.
     notes: RefCell<Vec<String>>,
     /// Fits take longer than reading: by path and tolerance, with the bytes that they take.
@@ -53,6 +56,7 @@ impl Default for Files {
             memory: MemoryAccount::new(u64::MAX),
             read: RefCell::default(),
             taken: RefCell::default(),
+            seconds: Cell::default(),
             notes: RefCell::default(),
             fitted: RefCell::default(),
             stopped: RefCell::default(),
@@ -221,7 +225,9 @@ impl Files {
     fn read_anew(&self, path: &Path, limits: &ReadParams, progress: &Progress) -> Result<Read, Error> {
         let memory = self.memory.up_to(limits.memory.limit());
         let params = ReadParams { memory: memory.clone(), ..limits.clone() };
+        let begun = Instant::now();
         let read = read::file(path, &params, Some(progress));
+        self.seconds.set(self.seconds.get() + begun.elapsed().as_secs_f64());
         let (data, notes) = read.map_err(|e| Error::from_read(path, &e))?;
         let what = crate::printable(path);
         let mut held = memory.take(&what, data.bytes()).map_err(Error::Limit)?;
@@ -241,6 +247,11 @@ impl Files {
         };
         held.set(&what, data.bytes()).map_err(Error::Limit)?;
         Ok((data, notes, held.into()))
+    }
+
+    /// Seconds that reading took since this was asked last.
+    pub(super) fn take_seconds(&self) -> f64 {
+        self.seconds.take()
     }
 
     /// None any more, on the same account.
