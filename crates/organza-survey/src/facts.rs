@@ -286,8 +286,9 @@ fn of_grid(grid: &Grid, table: Option<&NamedTable>) -> Facts {
         }
         Reading::Amounts => None,
     };
+    let is_of_one_value = grid.values.len() > 1 && range[0] == range[1];
     let said_of_one_value =
-        (range[0] == range[1]).then(|| format!("every voxel has the value {}, so it shows as a box", range[0]));
+        is_of_one_value.then(|| format!("every voxel has the value {}, so it shows as a box", range[0]));
     let labels = reading.labels();
     let fine = wide.map(|range| Histogram::new(&grid.values, range, FINE_BINS));
     Facts {
