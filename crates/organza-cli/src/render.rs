@@ -382,16 +382,12 @@ impl Job<'_> {
                     printable(path)
                 ));
             }
-            if report.without_room > 0 {
-                warnings.push(without_room(printable(path), report.without_room));
-            }
+            warnings.extend(said_of_legends(printable(path), report));
             written.push((path, report));
         }
         for film in films {
             let (bytes, report) = output::displayed_with_report(&render.layers, &metadata, &params)?;
-            if report.without_room > 0 {
-                warnings.push(without_room("the film", report.without_room));
-            }
+            warnings.extend(said_of_legends("the film", report));
             film.add(render.layers.size, &bytes)?;
         }
         Ok(written)
@@ -444,8 +440,17 @@ impl Job<'_> {
     }
 }
 
-/// The warning that a picture has no room for some legends.
-fn without_room(picture: impl std::fmt::Display, count: u64) -> String {
-    let legends = if count == 1 { "a legend".to_owned() } else { format!("{count} legends") };
-    format!("{picture}: there is no room for {legends}; use a larger --size")
+/// Warnings about what a picture does not show of its legends.
+fn said_of_legends(picture: impl std::fmt::Display, report: WriteReport) -> Vec<String> {
+    let WriteReport { without_room, boxes, .. } = report;
+    let counted = |count: u64, what: &str| if count == 1 { format!("a {what}") } else { format!("{count} {what}s") };
+    let room = (without_room > 0)
+        .then(|| format!("{picture}: there is no room for {}; use a larger --size", counted(without_room, "legend")));
+    let letters = (boxes > 0).then(|| {
+        format!(
+            "{picture}: {} of legends have no form but a box; write them in Latin or Greek ones",
+            counted(boxes, "letter")
+        )
+    });
+    room.into_iter().chain(letters).collect()
 }

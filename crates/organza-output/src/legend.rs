@@ -95,9 +95,18 @@ impl<'a> Panels<'a> {
     }
 }
 
-/// Draws legends at the right border, the first at the top; gives the number of those that have no room. A canvas for legends beside a picture has the
+/// What a picture does not show of its legends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Lacking {
+    /// Legends that have no room.
+    pub(super) without_room: u64,
+    /// Letters that are drawn as boxes.
+    pub(super) boxes: u64,
+}
+
+/// Draws legends at the right border, the first at the top. A canvas for legends beside a picture has the
 /// strip of [`with_strip`] already.
-pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale], place: LegendPlace) -> u64 {
+pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale], place: LegendPlace) -> Lacking {
     let [width, height] = canvas.size();
     let Panels { panels, capital: margin } = Panels::new([width, height], scales, place);
     let stacked: f64 = panels.iter().map(|panel| panel.height + margin).sum();
@@ -106,7 +115,8 @@ pub(super) fn draw(canvas: &mut Canvas<'_>, scales: &[ColorScale], place: Legend
         panel.draw(canvas, f64::from(width) - margin - panel.width, top, margin);
         top += panel.height + margin;
     }
-    (scales.len() - panels.len()) as u64
+    let boxes = panels.iter().flat_map(Panel::texts).flat_map(str::chars).filter(|letter| !glyphs::is_known(*letter));
+    Lacking { without_room: (scales.len() - panels.len()) as u64, boxes: boxes.count() as u64 }
 }
 
 /// The layers of a displayed picture with an empty strip to the right, in which [`draw`] puts legends.
@@ -226,6 +236,16 @@ fn shortened(text: String, fits: impl Fn(&str) -> bool) -> String {
 }
 
 impl Panel<'_> {
+    /// All that is written on it.
+    fn texts(&self) -> impl Iterator<Item = &str> {
+        let (ticks, rows): (&[(f64, String)], &[(Option<[f32; 3]>, String)]) = match &self.content {
+            Content::Bar(_, ticks) => (ticks, &[]),
+            Content::Rows(rows) => (&[], rows),
+        };
+        let title = std::iter::once(self.title.as_str());
+        title.chain(ticks.iter().map(|(_, text)| text.as_str())).chain(rows.iter().map(|(_, text)| text.as_str()))
+    }
+
     /// Draws it with its upper left corner at a place.
     fn draw(&self, canvas: &mut Canvas<'_>, left: f64, top: f64, capital: f64) {
         canvas.fill(pixels(left, self.width), pixels(top, self.height), PANEL, PANEL_OPACITY);
@@ -303,11 +323,22 @@ mod tests {
         let [width, height] = size;
         let mut samples = vec![brightness; 3 * width * height];
         let left = draw(&mut Canvas::new(&mut samples, width as u32, 3), scales, LegendPlace::Over);
-        (samples.as_chunks::<3>().0.to_vec(), left)
+        (samples.as_chunks::<3>().0.to_vec(), left.without_room)
     }
 
     fn count(picture: &[[f32; 3]], is: impl Fn(&[f32; 3]) -> bool) -> usize {
         picture.iter().filter(|pixel| is(pixel)).count()
+    }
+
+    #[test]
+    fn letters_without_a_form_are_counted() {
+        let of_title = |title: &str| {
+            let scale = ColorScale { column: Some(title.to_owned()), ..heights() };
+            let mut samples = vec![0.5; 3 * 640 * 480];
+            draw(&mut Canvas::new(&mut samples, 640, 3), &[scale], LegendPlace::Over)
+        };
+        assert_eq!(of_title("Größe, Δp → 3 µm² é"), Lacking { without_room: 0, boxes: 0 });
+        assert_eq!(of_title("名前 a"), Lacking { without_room: 0, boxes: 2 });
     }
 
     #[test]
@@ -374,7 +405,7 @@ mod tests {
                 let mut samples = wider.rgb("beauty").expect("a layer").as_flattened().to_vec();
                 assert_eq!(
                     draw(&mut Canvas::new(&mut samples, wider.size[0], 3), &scales, LegendPlace::Beside),
-                    0,
+                    Lacking { without_room: 0, boxes: 0 },
                     "{size:?}"
                 );
                 assert_eq!(

@@ -104,6 +104,8 @@ pub struct WriteReport {
     pub too_bright: u64,
     /// Legends that the picture has no room for.
     pub without_room: u64,
+    /// Letters of legends that are drawn as boxes: those beyond Latin ones and some Greek ones.
+    pub boxes: u64,
 }
 
 /// File formats by extension.

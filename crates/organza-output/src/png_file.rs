@@ -39,7 +39,9 @@ fn samples(layers: &Layers, metadata: &Metadata, params: &Params, report: &mut W
         if params.transparent { transparent(layers, gain, report)? } else { opaque(layers, gain, report)? };
     let channels = if params.transparent { 4 } else { 3 };
     let mut canvas = legend::Canvas::new(&mut samples, layers.size[0], channels);
-    report.without_room += legend::draw(&mut canvas, &params.legend, params.legend_place);
+    let lacking = legend::draw(&mut canvas, &params.legend, params.legend_place);
+    report.without_room += lacking.without_room;
+    report.boxes += lacking.boxes;
     Ok(samples)
 }
 

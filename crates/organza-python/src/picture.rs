@@ -289,6 +289,7 @@ impl Picture {
                 "translucent pixels lose light, as they are brighter than a straight colour can be: write an .exr",
             ),
             (report.without_room, "legends have no room: draw a larger picture"),
+            (report.boxes, "letters of legends are boxes: Latin ones and some Greek ones have a form"),
         ];
         let told = counts.into_iter().filter(|(count, _)| *count > 0);
         let mut said: Vec<String> = told.map(|(count, what)| format!("{}: {count} {what}", path.display())).collect();

@@ -15,7 +15,7 @@ const BLANK: f64 = 4.5;
 const UNKNOWN: &str = "030c6c6303";
 
 /// The glyphs; a blank has none.
-const GLYPHS: [(char, &str); 99] = [
+const GLYPHS: [(char, &str); 130] = [
     ('0', "2c3c5a553323050a2c"),
     ('1', "1a3c33,1353"),
     ('2', "0a2c3c5a580353"),
@@ -61,6 +61,7 @@ const GLYPHS: [(char, &str); 99] = [
     ('g', "5952302001,5839290705233354"),
     ('h', "0c03,0829395753"),
     ('i', "0903,0c0c"),
+    ('ı', "0903"),
     ('j', "29211000,2c2c"),
     ('k', "0c03,4905,2753"),
     ('l', "0c041323"),
@@ -115,7 +116,115 @@ const GLYPHS: [(char, &str); 99] = [
     ('²', "0b1c2b0828"),
     ('³', "0c2c1a291808"),
     ('µ', "0900,05233354,5953"),
+    ('±', "0959,2c26,0353"),
+    ('·', "0707"),
+    ('×', "0448,0844"),
+    ('→', "0767,496745"),
+    ('≤', "5b0855,0353"),
+    ('≥', "0b5805,0353"),
+    ('ß', "030a1c3c4b4a284756544323"),
+    ('Ø', "2c4c6a654323050a2c,036c"),
+    ('ø', "293957553323050729,0359"),
+    ('Γ', "030c5c"),
+    ('Δ', "033c6303"),
+    ('Θ', "2c4c6a654323050a2c,1858"),
+    ('Λ', "033c63"),
+    ('Π', "030c6c63"),
+    ('Σ', "6c0c480363"),
+    ('Ω', "032325080a2c4c6a68454363"),
+    ('α', "69554323050729395563"),
+    ('β', "000a2c3c5a4828,485655332305"),
+    ('γ', "09193530,3569"),
+    ('δ', "4b2c1b1a5755332305062838"),
+    ('ε', "58492908072646,260504234354"),
+    ('θ', "2c3c5a553323050a2c,0757"),
+    ('λ', "0c1c63,3803"),
+    ('μ', "0900,05233354,5953"),
+    ('π', "0969,1913,5953"),
+    ('ρ', "000729395755332304"),
+    ('σ', "692907052343555749"),
+    ('τ', "0959,29243343"),
+    ('φ', "293957553323050729,3c30"),
+    ('ω', "19070513233538,354353656759"),
 ];
+
+/// A mark above or below letters.
+struct Mark {
+    /// The letters that have it, and the same ones without it, of which the small i has no dot.
+    marked: &'static str,
+    plain: &'static str,
+    /// Its lines, as those of glyphs: to the right of 2, which is the middle of the letter, and above 0, which is its top or its foot.
+    lines: &'static [&'static [[f64; 2]]],
+    is_below: bool,
+}
+
+/// From the top of a letter to its mark.
+const ABOVE: f64 = 1.2;
+
+const MARKS: [Mark; 8] = [
+    Mark { marked: "ÀÈÌÒÙàèìòù", plain: "AEIOUaeıou", lines: &[&[[1.0, 2.0], [3.0, 0.0]]], is_below: false },
+    Mark {
+        marked: "ÁÉÍÓÚÝáéíóúýĆćŃńŚśŹźŐőŰű",
+        plain: "AEIOUYaeıouyCcNnSsZzOoUu",
+        lines: &[&[[1.0, 0.0], [3.0, 2.0]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ÂÊÎÔÛâêîôû",
+        plain: "AEIOUaeıou",
+        lines: &[&[[0.5, 0.0], [2.0, 2.0], [3.5, 0.0]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ČčĚěŘřŠšŽžŇňĎďŤť",
+        plain: "CcEeRrSsZzNnDdTt",
+        lines: &[&[[0.5, 2.0], [2.0, 0.0], [3.5, 2.0]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ÃÑÕãñõ",
+        plain: "ANOano",
+        lines: &[&[[0.0, 0.0], [1.0, 1.2], [3.0, 0.0], [4.0, 1.2]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ÄËÏÖÜäëïöüÿ",
+        plain: "AEIOUaeıouy",
+        lines: &[&[[0.8, 1.0], [0.8, 1.0]], &[[3.2, 1.0], [3.2, 1.0]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ÅåŮů",
+        plain: "AaUu",
+        lines: &[&[[2.0, -0.4], [0.9, 0.7], [2.0, 1.8], [3.1, 0.7], [2.0, -0.4]]],
+        is_below: false,
+    },
+    Mark {
+        marked: "ÇçŞş",
+        plain: "CcSs",
+        lines: &[&[[2.0, 0.0], [2.0, -1.0], [3.0, -2.0], [1.2, -2.6]]],
+        is_below: true,
+    },
+];
+
+/// A letter without its mark, and the mark.
+fn parted(character: char) -> (char, Option<&'static Mark>) {
+    let find = |mark: &'static Mark| {
+        let at = mark.marked.chars().position(|marked| marked == character)?;
+        mark.plain.chars().nth(at).map(|plain| (plain, Some(mark)))
+    };
+    MARKS.iter().find_map(find).unwrap_or((character, None))
+}
+
+/// The lines of a mark over or under a letter.
+fn mark_lines(letter: char, mark: &'static Mark) -> impl Iterator<Item = [[f64; 2]; 2]> + Clone {
+    let ends = || letter_lines(letter).flatten();
+    let middle = 0.5 * ends().fold(0.0, |most: f64, [right, _]| most.max(right));
+    let top = ends().fold(0.0, |most: f64, [_, up]| most.max(up));
+    let height = if mark.is_below { 0.0 } else { top + ABOVE };
+    let placed = move |[right, up]: [f64; 2]| [middle + right - 2.0, height + up];
+    mark.lines.iter().flat_map(|line| line.windows(2)).map(move |ends| [placed(ends[0]), placed(ends[1])])
+}
 
 /// The lines of a glyph; `None` for a blank.
 fn drawn(character: char) -> Option<&'static str> {
@@ -125,6 +234,12 @@ fn drawn(character: char) -> Option<&'static str> {
 
 /// The lines of a character from end to end: to the right of where it begins, and above the line that it stands on.
 pub(super) fn lines(character: char) -> impl Iterator<Item = [[f64; 2]; 2]> + Clone {
+    let (letter, mark) = parted(character);
+    letter_lines(letter).chain(mark.into_iter().flat_map(move |mark| mark_lines(letter, mark)))
+}
+
+/// The same of a character without a mark.
+fn letter_lines(character: char) -> impl Iterator<Item = [[f64; 2]; 2]> + Clone {
     let polylines = drawn(character).into_iter().flat_map(|glyph| glyph.split(','));
     polylines
         .flat_map(|polyline| {
@@ -143,7 +258,14 @@ pub(super) fn advance(character: char) -> f64 {
     if drawn(character).is_none() {
         return BLANK;
     }
-    lines(character).flatten().fold(0.0, |most: f64, [right, _]| most.max(right)) + BETWEEN
+    let (letter, _) = parted(character);
+    letter_lines(letter).flatten().fold(0.0, |most: f64, [right, _]| most.max(right)) + BETWEEN
+}
+
+/// Whether a character is drawn as itself, not as a box.
+pub(super) fn is_known(character: char) -> bool {
+    let (letter, _) = parted(character);
+    drawn(letter) != Some(UNKNOWN)
 }
 
 /// Width of a text.
@@ -166,7 +288,7 @@ mod tests {
 
     #[test]
     fn lines_are_pairs_of_digits_within_the_height_of_a_line() {
-        for character in ' '..='µ' {
+        for character in GLYPHS.map(|(character, _)| character) {
             for polyline in drawn(character).into_iter().flat_map(|glyph| glyph.split(',')) {
                 assert!(polyline.len() >= 4 && polyline.len() % 2 == 0, "{character}: {polyline}");
                 assert!(polyline.bytes().all(|b| b.is_ascii_hexdigit()), "{character}: {polyline}");
@@ -175,6 +297,21 @@ mod tests {
                 assert!(right <= 8.0 && (-3.0..=10.0).contains(&up), "{character}: {right} {up}");
             }
         }
+    }
+
+    #[test]
+    fn letters_with_marks_are_letters_with_lines_above_or_below() {
+        for mark in &MARKS {
+            assert_eq!(mark.marked.chars().count(), mark.plain.chars().count(), "{}", mark.marked);
+            for (marked, plain) in mark.marked.chars().zip(mark.plain.chars()) {
+                assert!(is_known(marked) && is_known(plain), "{marked}");
+                assert_eq!(advance(marked), advance(plain), "{marked}");
+                let heights = |character: char| lines(character).flatten().map(|[_, up]| up);
+                let [top, foot] = [heights(plain).fold(0.0, f64::max), heights(plain).fold(0.0, f64::min)];
+                assert!(heights(marked).any(|up| up > top || up < foot), "{marked}");
+            }
+        }
+        assert!(!is_known('名') && is_known(' '));
     }
 
     #[test]

@@ -68,7 +68,10 @@ def _of_objects(array: np.ndarray, thing: Any, expected: str) -> np.ndarray:
         if part is not None and not isinstance(part, numbers.Real):
             index = ", ".join(str(int(step)) for step in np.unravel_index(place, array.shape))
             raise InputError(f"{expected}, found objects of Python, of which that at [{index}] is {part!r}")
-    return array.astype(np.float64)
+    try:
+        return array.astype(np.float64)
+    except OverflowError:
+        raise InputError(f"{expected}, found one that is larger than any of double precision") from None
 
 
 def _no_numbers(array: np.ndarray) -> str:

@@ -34,6 +34,9 @@ def lattice_of(
         raise InputError(f"{name}: expected the shape (nz, ny, nx), found {np.shape(grid)}{part}")
     if not grid.size:
         raise InputError(f"{name}: expected a volume with voxels, found the shape {grid.shape}")
+    if grid.dtype.kind == "f" and np.isinf(grid).any():
+        place = np.argwhere(np.isinf(grid))[0].tolist()
+        raise InputError(f"{name}: expected voxels of finite numbers, or NaN for a gap, found {grid[tuple(place)]} at {place}")
     if not is_told_apart(grid):
         low = float(np.nanmin(grid))
         raise InputError(f"{name}: expected values that single precision tells apart, found some that differ by little beside {low:g}; `{name} - {low:g}` does")

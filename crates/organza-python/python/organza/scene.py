@@ -682,6 +682,8 @@ class Scene:
             raise InputError(f"{key!r}: expected a key and a value, such as 'render.technique' and 'surfels', found {value!r}")
         if parts[-1] == "color":
             value = color_of(value, key)
+        if len(parts) == 3 and parts[0] in ("object", "light") and parts[2] == "name":
+            raise InputError(f"{key}: expected another key, found the name, which stays what it is; `remove` takes an object away, to add it by another name")
         # What is refused changes nothing.
         changed = copy.deepcopy(self._document)
         place: Any = changed
@@ -1180,7 +1182,8 @@ def _check_finite(name: str, thing: Any) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
         what = "numbers" if array.ndim == 1 else "coordinates"
-        raise InputError(f"{name}: expected finite {what}, found {array[row].tolist()} in row {row}; leave such rows out")
+        masked = ", which is masked" if np.ma.is_masked(thing) else ""
+        raise InputError(f"{name}: expected finite {what}, found {array[row].tolist()} in row {row}{masked}; leave such rows out")
 
 
 def _check_faces(faces: Any) -> None:

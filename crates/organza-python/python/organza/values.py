@@ -39,7 +39,7 @@ def number(name: str, value: Any) -> float:
     except OverflowError:
         found = math.inf
     if not math.isfinite(found):
-        raise InputError(f"{name}: expected a finite number, found {value!r}")
+        raise InputError(f"{name}: expected a finite number, found {kind_of(value)}")
     return found
 
 
@@ -47,7 +47,7 @@ def place_of(name: str, value: Any) -> list[float]:
     """Three finite numbers."""
     parts = parts_of(value)
     if len(parts) != 3:
-        raise InputError(f"{name}: expected three numbers, found {value!r}")
+        raise InputError(f"{name}: expected three numbers, found {kind_of(value)}")
     return [number(name, part) for part in parts]
 
 
@@ -62,9 +62,9 @@ def whole(name: str, value: Any, unit: str = "") -> int | None:
         return None
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if is_number and value > _MOST:
-        raise InputError(f"{name}: expected at most {_MOST}{unit and f' {unit}'}, found {value!r}")
+        raise InputError(f"{name}: expected at most {_MOST}{unit and f' {unit}'}, found {kind_of(value)}")
     if not is_number or not value >= 1 or value != int(value):
-        raise InputError(f"{name}: expected a whole number{unit and f' of {unit}'} from 1 on, found {value!r}")
+        raise InputError(f"{name}: expected a whole number{unit and f' of {unit}'} from 1 on, found {kind_of(value)}")
     return int(value)
 
 
