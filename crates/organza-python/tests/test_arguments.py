@@ -99,7 +99,7 @@ REFUSED = {
     "labels that are none": (lambda: og.Scene().add_labels(np.full((3, 3, 3), -1)), "values: expected a label other than 0 and -1, which are nothing"),
     "labels below none": (lambda: og.Scene().add_labels(np.full((3, 3, 3), -5)), "values: expected whole numbers from 0 that name regions, or -1 for none, found -5"),
     "labels with a part": (lambda: og.Scene().add_labels(np.full((3, 3, 3), 1.5)), "values: expected whole numbers .* found 1.5"),
-    "an angle in words": (lambda: points().camera.orbit(azimuth="left"), "^azimuth: expected a finite number, found 'left'"),
+    "an angle in words": (lambda: points().camera.orbit(azimuth="left"), "^azimuth: expected a finite number, found the text 'left'"),
     "a size of a camera": (lambda: points().camera(size=(64.5, 3)), "^size: expected a whole number from 1 on, found 64.5"),
     "a look of no text": (lambda: og.render(PLACES, preset=5), "^preset: expected the name of a look, found 5"),
     "a column of no text": (lambda: og.render(PLACES, color_by=VALUES), r"^color_by: expected the name of a column, found an array of the shape \(40,\)"),

@@ -48,7 +48,7 @@ REFUSED = {
     "threads beyond number": (lambda: og.render(PLACES, size=SMALL, threads=10**30), "threads: expected at most"),
     "a size beyond number": (lambda: og.render(PLACES, size=(10**30, 72)), "size: expected at most"),
     "an azimuth beyond number": (lambda: og.render(PLACES, azimuth=10**400), "azimuth: expected a finite number"),
-    "a direction in words": (lambda: og.render(PLACES, azimuth="left"), "azimuth: expected a finite number, found 'left'"),
+    "a direction in words": (lambda: og.render(PLACES, azimuth="left"), "azimuth: expected a finite number, found the text 'left'"),
     "faces behind their counts": (lambda: scene().add_mesh(PLACES, [[3, 0, 1, 2]] * 5), "faces: expected the corners of each face, found 3 before"),
     "bytes with a point": (lambda: scene().add_points(PLACES, colors=np.full((4, 3), 200.0)), "colors: expected linear numbers, 1 for white, found float64 up to 200"),
     "a mask of points": (lambda: scene().add_points(np.ma.masked_greater(np.eye(3), 0.5)), "row 0"),
