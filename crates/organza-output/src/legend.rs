@@ -237,13 +237,13 @@ fn shortened(text: String, fits: impl Fn(&str) -> bool) -> String {
 
 impl Panel<'_> {
     /// All that is written on it.
-    fn texts(&self) -> impl Iterator<Item = &str> {
-        let (ticks, rows): (&[(f64, String)], &[(Option<[f32; 3]>, String)]) = match &self.content {
-            Content::Bar(_, ticks) => (ticks, &[]),
-            Content::Rows(rows) => (&[], rows),
-        };
-        let title = std::iter::once(self.title.as_str());
-        title.chain(ticks.iter().map(|(_, text)| text.as_str())).chain(rows.iter().map(|(_, text)| text.as_str()))
+    fn texts(&self) -> Vec<&str> {
+        let mut texts = vec![self.title.as_str()];
+        match &self.content {
+            Content::Bar(_, ticks) => texts.extend(ticks.iter().map(|(_, text)| text.as_str())),
+            Content::Rows(rows) => texts.extend(rows.iter().map(|(_, text)| text.as_str())),
+        }
+        texts
     }
 
     /// Draws it with its upper left corner at a place.
