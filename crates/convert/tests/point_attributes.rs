@@ -312,6 +312,15 @@ fn balls_have_discs_all_around_at_their_radius() {
         let away = cloud.position[0].as_dvec3() - cloud.position[discs / 2].as_dvec3();
         assert!(away.length() < 2.0 * radius && away.length() > radius, "{away}, {radius}");
     }
+    // Points at one place are told of, unless they become one.
+    let mut twice = filling(100);
+    twice.position.extend_from_within(..);
+    let said = |merge_duplicates: bool| {
+        let params = SurfelParams { merge_duplicates, ..balls.clone() };
+        raw_to_surfels(&twice, &params, None).unwrap().1.said()
+    };
+    assert!(said(false).unwrap().contains("100 points lie where another one lies"));
+    assert_eq!(said(true), None);
     // Few balls have more discs, many have few.
     for (count, expected) in [(3, 3 * 512), (100_000, 600_000)] {
         assert_eq!(surfels(&filling(count), &balls).len(), expected);

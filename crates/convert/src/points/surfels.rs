@@ -96,6 +96,8 @@ pub struct SurfelReport {
     pub points: u64,
     /// Points that lie where an earlier one lies.
     pub duplicates: u64,
+    /// Points that are shown: as one surfel each, or as a ball of several.
+    pub shown: u64,
     /// Surfels made.
     pub splats: u64,
     /// Places whose neighbours lie on a line, so that the normal is a guess; none where neighbours are not asked.
@@ -112,7 +114,7 @@ impl SurfelReport {
     /// Warns that points at one place have each become a surfel, in a sentence without a full stop.
     pub fn said(&self) -> Option<String> {
         let lie = if self.duplicates == 1 { "lies" } else { "lie" };
-        (self.duplicates > 0 && self.splats >= self.points)
+        (self.duplicates > 0 && self.shown == self.points)
             .then(|| format!("{} {lie} where another one lies", counted(self.duplicates, "point")))
     }
 }
@@ -149,13 +151,13 @@ pub fn raw_to_surfels(
     if !points.gaussians.is_empty() {
         return gaussian_points::to_cloud(points, params).map(|cloud| {
             let n = points.len() as u64;
-            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+            (cloud, SurfelReport { points: n, shown: n, splats: n, ..SurfelReport::default() })
         });
     }
     if !points.ready.cloud.is_empty() {
         return from_splats::to_cloud(points, params).map(|cloud| {
             let n = points.len() as u64;
-            (cloud, SurfelReport { points: n, splats: n, ..SurfelReport::default() })
+            (cloud, SurfelReport { points: n, shown: n, splats: n, ..SurfelReport::default() })
         });
     }
     let order = canonical_order(points);
@@ -200,16 +202,12 @@ pub fn raw_to_surfels(
 /// ```
 pub fn scattered_share(points: &RawPoints) -> f64 {
     const FEW_PLACES: usize = 32;
-    // Of more points every nth tells.
-    const MOST_POINTS: usize = 1 << 22;
     const RUNS: usize = 64;
     const RUN: usize = 1024;
     if points.validate().is_err() {
         return 0.0;
     }
-    let nth = points.len().div_ceil(MOST_POINTS).max(1);
-    let some = RawPoints { position: points.position.iter().step_by(nth).copied().collect(), ..RawPoints::default() };
-    let (distinct, _) = distinct_places(&some, &canonical_order(&some));
+    let (distinct, _) = distinct_places(points, &canonical_order(points));
     if distinct.len() < FEW_PLACES {
         return 0.0;
     }
@@ -437,6 +435,7 @@ fn emit(
         None => of_surface,
     };
     report.splats = surfels.len() as u64;
+    report.shown = (surfels.len() / directions.len()) as u64;
     let mut cloud = Cloud::new(t.apply(points.origin));
     let filled = column_set(points, params);
     let kind = if filled.crossing_depth { SplatKind::Surface } else { SplatKind::Opaque };

@@ -452,12 +452,19 @@ fn raw_points<'a>(
     })
 }
 
-/// The shape of discs of points whose object states none: balls where opaque points lie on no surface.
+/// The most splats that balls become unasked: of more points each ball would be about a pixel, and its discs fill the memory.
+const MOST_SPLATS_OF_BALLS: u64 = 4_000_000;
+
+/// The shape of discs of points whose object states none: balls where opaque points lie on no surface, and their splats are within all limits.
 fn shape_of_most(path: &Path, points: &RawPoints, params: &SurfelParams, context: &ObjectContext<'_>) -> DiscShape {
     let is_plain = points.normal.is_empty() && points.gaussians.is_empty() && points.ready.cloud.is_empty();
     let has_tangents = TANGENT.into_iter().any(|name| points.own_column(name).is_some());
     let is_opaque = params.opacity * f64::from(points.least_opacity()) >= 1.0;
-    if !is_plain || has_tangents || !is_opaque {
+    let balls = SurfelParams { shape: DiscShape::Balls, ..params.clone() };
+    let may_be_made = convert::cost::raw_points(points, &balls).is_ok_and(|predicted| {
+        predicted.splats <= MOST_SPLATS_OF_BALLS && predicted.bytes <= context.options.max_memory / 8
+    });
+    if !is_plain || has_tangents || !is_opaque || !may_be_made {
         return DiscShape::default();
     }
     let share = convert::scattered_share(points);
