@@ -71,7 +71,7 @@ fn estimates_text(plan: &Plan) -> String {
     text + "errs by about: an estimate of the change of a pixel as it is displayed, of black to white; it is no bound\n\n"
 }
 
-/// What the plan compared as a table; nothing where there was one choice alone.
+/// A table of the techniques that `auto` compared; empty where one alone came into question.
 fn compared_text(plan: &Plan) -> String {
     const MOST_ROWS: usize = 24;
     if plan.compared.is_empty() {

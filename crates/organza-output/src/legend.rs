@@ -95,7 +95,7 @@ impl<'a> Panels<'a> {
     }
 }
 
-/// What a picture does not show of its legends.
+/// Counts of legends and letters that a picture fails to show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Lacking {
     /// Legends that have no room.

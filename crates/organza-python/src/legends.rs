@@ -10,7 +10,7 @@ use std::sync::Arc;
 const VALUES: &str = "value";
 /// The column of the surfaces of labels.
 const LABEL: &str = "label";
-/// What stands in the place of a map's name for whole numbers.
+/// Names of the colours of whole numbers, beside those of maps.
 const CLASSES: &str = "classes";
 const DISTINCT: &str = "distinct";
 

@@ -228,7 +228,7 @@ impl Picture {
         &self.facts
     }
 
-    /// What its colours stand for, for [`Self::of_parts`].
+    /// Its legends, which [`Self::of_parts`] takes in another process.
     #[getter]
     fn legends(&self) -> Vec<Legend> {
         self.scales.iter().map(Legend::new).collect()

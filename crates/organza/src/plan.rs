@@ -140,7 +140,7 @@ pub struct Plan {
     pub effects: Vec<Effect>,
     /// What the techniques that draw err by, and those that `auto` may take in their place, by object.
     pub estimates: Vec<Estimate>,
-    /// What the plan compared to choose the techniques that the scene leaves to it; empty where there was one choice alone.
+    /// The techniques that were compared for objects whose technique the scene leaves open; empty where one alone came into question.
     pub compared: Vec<ComparedTechnique>,
     /// Effects of objects that are left out by their bounds: the picture is that of a scene without their causes.
     pub left_out: Vec<SwitchedEffect>,

@@ -350,7 +350,7 @@ struct Sorted {
     places: Vec<Place>,
 }
 
-/// What a surfel is made of.
+/// The point and the place of a surfel.
 #[derive(Debug, Clone, Copy)]
 struct Origin {
     place: u32,
@@ -362,7 +362,7 @@ struct Origin {
 }
 
 impl Sorted {
-    /// What each surfel is made of: as many of each point as a ball has discs, else one.
+    /// Surfels in the order of places: of each point as many as a ball has discs, else one.
     fn surfels(&self, merge: bool, discs_of_each: usize) -> Vec<Origin> {
         let mut surfels = Vec::with_capacity(self.order.len() * discs_of_each);
         for (place, range) in self.starts.windows(2).enumerate() {

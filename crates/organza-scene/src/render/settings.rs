@@ -8,7 +8,7 @@ use splat_core::{Accumulation, Direction};
 pub struct RenderSettings {
     /// The technique.
     pub technique: Technique,
-    /// What the plan compared to choose the technique of each object that the scene leaves to it; `None` where the plan chose nothing.
+    /// The techniques that the plan compared for objects whose technique the scene leaves open; `None` where it leaves none open.
     pub choice: Option<Vec<ComparedTechnique>>,
     /// Samples along each side of a pixel, 1 to 8.
     pub antialias: u32,
@@ -49,7 +49,7 @@ pub struct RenderSettings {
 pub struct ComparedTechnique {
     /// Name of the object that it would draw by itself; `None` where it would draw all objects that the scene leaves to the plan.
     pub object: Option<String>,
-    /// What would draw, in words, such as `sheets`.
+    /// The technique or techniques in words, such as `sheets`.
     pub drawn_by: String,
     /// The greatest change of a displayed pixel (0 to 1) that it errs by, about; infinite where it is not known.
     pub displayed_error: f64,

@@ -96,7 +96,7 @@ struct Way {
     refusal: Option<String>,
 }
 
-/// What techniques are compared by.
+/// The error and the time by which techniques are compared.
 #[derive(Debug, Clone, Copy)]
 struct Weight {
     /// The greatest estimate of a change of a displayed pixel.
@@ -169,7 +169,7 @@ fn suiting(candidates: &[Candidate], tolerance: f64) -> Option<&Candidate> {
     fastest.or_else(errs_least)
 }
 
-/// What was compared where there was more than one choice: the techniques of each object, where each is drawn by what suits it, then the ways of all.
+/// The techniques of each object that has several, where each is drawn by the one that suits it, then the ways to draw all of them.
 fn compared(scene: &Scene, facts: &SourceFacts, ways: &[Way], taken: &Way) -> Vec<ComparedTechnique> {
     let tolerance = scene.render.tolerance;
     let is_open = |object: &SceneObject| object.visible && technique_of(object, scene) == Technique::Auto;
@@ -239,7 +239,7 @@ fn reason_against(one: Weight, taken: Weight, tolerance: f64) -> &'static str {
 }
 
 impl Way {
-    /// What draws the objects that the scene leaves to the plan, in words.
+    /// The techniques of objects that the scene leaves to the plan, in words.
     fn drawn_by(&self, scene: &Scene) -> String {
         let open = || scene.objects.iter().zip(&self.by).filter(|(object, _)| object.visible);
         let draws = |row: &&Row| {
@@ -520,7 +520,7 @@ mod tests {
             of_glass.iter().map(|one| (one.drawn_by.as_str(), one.is_taken, one.reason.as_str())).collect();
         assert!(told.contains(&("surfels", true, "the fastest that errs within the tolerance")), "{told:?}");
         assert!(told.contains(&("points", false, "what it errs by is not known")), "{told:?}");
-        // What cannot be taken says so.
+        // A way that does not fit says why.
         let small = RenderOptions { max_memory: 1 << 20, ..RenderOptions::default() };
         let of_small = compared(&[CLOUD], &small);
         assert!(
