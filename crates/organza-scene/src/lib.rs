@@ -17,7 +17,6 @@ mod camera;
 mod effects;
 mod error;
 mod footprint;
-mod in_memory;
 mod light;
 mod limits;
 mod load;
@@ -38,7 +37,6 @@ pub use convert::{ColorMap, ColorScale, Label, LabelTable, MapScale, PointColors
 pub use effects::kinds::{EffectKind, HangsOn, SwitchedEffect};
 pub use error::Error;
 pub use field::Combination;
-pub use in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of as source_in_memory};
 pub use light::model::{SceneLight, SlideSource};
 pub use light::points::{LightPoint, light_points};
 pub use load::options::LoadOptions;
@@ -58,6 +56,7 @@ pub use render::settings::{
 };
 pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};
+pub use source::in_memory::{InMemory, SourceData, name_of as name_in_memory, source_of as source_in_memory};
 pub use source::model::{
     CloudSource, CombinedSource, DensitySource, ExtractSource, FieldSource, ImplicitSource, IsosurfaceSource,
     LevelSetSource, MOST_ABSORBANCE, MatterSource, SliceSource, Source, VolumeSource,

@@ -1,7 +1,8 @@
 //! Paths of data: relative to the scene file, inside the scene's root folder, or inside the one that it names, unless allowed.
 
-use super::{InMemory, LoadOptions, in_memory};
+use super::{InMemory, LoadOptions};
 use crate::at::At;
+use crate::source::in_memory;
 use crate::{Error, printable, shown};
 use std::path::{Component, Path, PathBuf};
 

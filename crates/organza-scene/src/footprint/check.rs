@@ -2,8 +2,8 @@
 
 use crate::at::At;
 use crate::footprint::raw::{NumberOr, RawChoice, RawChosen, RawFootprint, RawImages};
-use crate::in_memory::SourceData;
 use crate::paths::Paths;
+use crate::source::in_memory::SourceData;
 use crate::{Error, LoadOptions, Source, printable, shown};
 use convert::FootprintChoice;
 use read::{Fault, Loaded, ReadError, ReadParams, file};

@@ -2,7 +2,6 @@
 
 use crate::at::At;
 use crate::footprint::check::check_choice;
-use crate::in_memory::name_of;
 use crate::limits::{LARGEST, SMALLEST};
 use crate::object::labels::{LABEL_COLUMN, check_labels};
 use crate::object::points_check::check_points;
@@ -11,6 +10,7 @@ use crate::paths::Paths;
 use crate::render::check::check_technique;
 use crate::source::check::check_source;
 use crate::source::field::{check_clip, check_shown_field};
+use crate::source::in_memory::name_of;
 use crate::{Error, FieldSource, ObjectLabels, SceneMaterial, SceneObject, Source, Technique, Up, UpBy};
 use convert::{ColorBy, PointColors};
 use glam::{DQuat, DVec3};

@@ -1,6 +1,6 @@
 //! The checked scene: everything a render needs, in radians and f64 world units.
 
-use crate::in_memory::{InMemory, name_of};
+use crate::source::in_memory::{InMemory, name_of};
 use crate::{
     CameraFit, EnvironmentSource, Error, RenderSettings, SceneLight, SceneMaterial, SceneObject, Source, Stop,
     Technique, TechniqueKey,
