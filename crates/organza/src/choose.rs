@@ -8,7 +8,7 @@ mod passes;
 mod settings;
 pub(crate) mod settle;
 
-pub(crate) use effects::{CausedMap, CausedObject, CausedWork, changed_without, displayed, plan};
+pub(crate) use effects::{CausedMap, CausedObject, CausedWork, changed_without, changed_without_color, plan};
 pub(crate) use settings::settings;
 
 use crate::escape_controls;

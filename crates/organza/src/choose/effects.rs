@@ -88,15 +88,16 @@ pub(crate) fn plan(statistics: &Statistics) -> Plan {
     plan
 }
 
-/// The most that this radiance can add to a displayed pixel, 0 to 1.
-pub(crate) fn displayed(radiance: f64, statistics: &Statistics) -> f64 {
-    gain::displayed(radiance, gain::gain(statistics))
-}
-
 /// The most that a displayed pixel changes without an object that shows no more than this radiance, and of which each ray of the view and of lights
 /// takes no more than this share; `None` where it is not known.
 pub(crate) fn changed_without(opacity: f64, shown: f64, statistics: &Statistics) -> Option<f64> {
     object::change(opacity, opacity, shown, statistics)
+}
+
+/// The most that a displayed pixel changes without the colour of such an object, where the optical depth of a channel changes by this along each of those
+/// rays; `None` where it is not known.
+pub(crate) fn changed_without_color(stretched: f64, shown: f64, statistics: &Statistics) -> Option<f64> {
+    color::change(stretched, stretched, shown, statistics)
 }
 
 /// Takes effects of objects into a plan: those that are left out by their bound.

@@ -1,7 +1,7 @@
 //! Facts of the effects of each object once it is loaded.
 
 use crate::brightness::ObjectBrightness;
-use crate::choose::{changed_without, displayed, row, technique_of};
+use crate::choose::{changed_without, changed_without_color, row, technique_of};
 use crate::load::Loaded;
 use crate::scene::{EffectKind, Scene, SceneObject};
 use crate::shadows::{Hiding, SEEN, Shadowing, View, hiding};
@@ -39,13 +39,14 @@ pub(super) fn object_facts(
         if shows_others { statistics.brightest } else { sent + given_off }
     };
     let is_thin = |rank: usize, depth: f64| {
-        let object = &scene.objects[rank];
-        let opacity = -libm::expm1(-depth);
-        let change = opacity.min(depth * color_spread(&loaded.materials[object.material]).max(f64::MIN_POSITIVE));
+        let material = &loaded.materials[scene.objects[rank].material];
         let is_within = |change: f64| change <= statistics.tolerance;
-        let is_colored = EffectKind::Color.is_of(&loaded.materials[object.material]);
-        changed_without(opacity, shown(rank), statistics).is_some_and(is_within)
-            || is_colored && is_within(displayed(change * statistics.brightest, statistics))
+        let without_color = || {
+            let stretched = depth * color_spread(material).max(f64::MIN_POSITIVE);
+            changed_without_color(stretched, shown(rank), statistics).is_some_and(is_within)
+        };
+        changed_without(-libm::expm1(-depth), shown(rank), statistics).is_some_and(is_within)
+            || EffectKind::Color.is_of(material) && without_color()
     };
     let hidings = hiding(loaded, &view, brightness, &is_thin);
     let longest = longest_way(scene, loaded, is_bent);
