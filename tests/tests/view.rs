@@ -105,6 +105,27 @@ fn saved_files_are_those_of_render_with_the_same_changes() {
 }
 
 #[test]
+fn a_cut_is_that_of_render_and_is_saved() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    view.post(
+        "events",
+        r#"[{"do": "cuts", "cuts": [{"object": "fog", "normal": [0, 0, 2], "point": [7, 7, 0.125]}]},
+            {"do": "color", "object": "pane", "color": [0.25, 0.5, 1]}]"#,
+    );
+    place.write("view.png", view.saved("picture.png"));
+    let cut = "object.fog.clip=[{ normal = [0, 0, 2], point = [7, 7, 0.125] }]";
+    let color = "object.pane.color=[0.25, 0.5, 1]";
+    place.expect(0, &["render", "s.toml", "-o", "cut.png", "--set", cut, "--set", color], "");
+    assert_eq!(place.pixels("view.png"), place.pixels("cut.png"));
+    place.expect(0, &["render", "s.toml", "-o", "whole.png", "--set", color], "");
+    assert_ne!(place.pixels("view.png"), place.pixels("whole.png"));
+    let scene = String::from_utf8(view.saved("scene")).unwrap();
+    assert!(scene.contains("clip = [{ normal = [0.0, 0.0, 2.0], point = [7.0, 7.0, 0.125] }]"), "{scene}");
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
 fn a_saved_scene_opens_from_where_the_browser_put_it() {
     let place = Place::new(SMALL_SCENE);
     place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");

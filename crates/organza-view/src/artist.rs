@@ -294,11 +294,14 @@ impl Artist {
         showing: Showing,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        let (coarse, render) = self.render_coarse(scene, request.layer.as_deref(), progress)?;
+        let (coarse, render) = self.render_coarse(scene, request, progress)?;
         if render.sets.is_some_and(|sets| sets.interrupted) {
             return Err(Error::Cancelled);
         }
         let time = start.elapsed();
+        if let Some(bounds) = self.coarse.bounds() {
+            desk.keep_bounds(bounds);
+        }
         let rested = self.detail.at_rest(&render.cost);
         // More pixels cost nothing before they are drawn.
         let is_rested = rested.share == self.detail.share && rested.divisor <= self.detail.divisor;
@@ -325,12 +328,14 @@ impl Artist {
     fn render_coarse(
         &mut self,
         scene: &Scene,
-        layer: Option<&str>,
+        request: &Request,
         progress: &Progress,
     ) -> Result<(Scene, Render), Error> {
+        let layer = request.layer.as_deref();
         if !self.refused.as_ref().is_some_and(|refused| differ_in_camera_alone(refused, scene)) {
             let coarse = self.detail.of_scene(scene, layer, Some(Technique::Points));
-            match self.coarse.render(&coarse, &self.options, progress) {
+            let whole = uncut(&coarse, &request.uncut);
+            match self.coarse.preview(&coarse, &whole, &self.options, progress) {
                 Ok(render) => return Ok((coarse, render)),
                 Err(Error::Input { .. } | Error::Usage { .. } | Error::Scene(_) | Error::Limit(_)) => {
                     self.refused = Some(scene.clone());
@@ -342,6 +347,16 @@ impl Artist {
         let render = self.coarse.render(&coarse, &self.options, progress)?;
         Ok((coarse, render))
     }
+}
+
+/// A scene before the view hid or cut objects of it.
+fn uncut(scene: &Scene, objects: &[SceneObject]) -> Scene {
+    let mut whole = scene.clone();
+    for (object, before) in whole.objects.iter_mut().zip(objects) {
+        object.visible |= before.visible;
+        object.clip.clone_from(&before.clip);
+    }
+    whole
 }
 
 /// Who sees a coarse picture.

@@ -43,7 +43,7 @@ impl CurveRow {
 }
 
 /// A number with the few digits that single precision has: scenes are read as the same one.
-fn number(single: f32) -> f64 {
+pub(crate) fn number(single: f32) -> f64 {
     single.to_string().parse().unwrap_or(f64::from(single))
 }
 

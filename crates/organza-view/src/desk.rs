@@ -9,9 +9,10 @@ use crate::picture::{Drawn, EffectRow, Level, Picture};
 use crate::state::Accuracy;
 use crate::viewpoint::Viewpoint;
 use crate::wording::{self, Said};
-use organza::scene::Scene;
+use organza::scene::{Scene, SceneObject};
 use organza::{Error, Progress};
 use serde::Serialize;
+use splat_core::DAabb;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -25,6 +26,8 @@ pub(crate) struct Request {
     pub(crate) scene: Scene,
     /// The same scene with the accuracy that it states.
     pub(crate) stated: Scene,
+    /// Its objects before the view hid or cut any.
+    pub(crate) uncut: Arc<Vec<SceneObject>>,
     /// The position between fast and exact.
     pub(crate) accuracy: Accuracy,
     /// What files tell of the scene.
@@ -95,6 +98,8 @@ struct Papers {
     depths: Option<Arc<Depths>>,
     /// How often values of volumes occur, by the names of the objects.
     curves: BTreeMap<String, Values>,
+    /// A box around all that was drawn, world units.
+    bounds: Option<DAabb>,
     /// What objects are made of, by their names.
     data: BTreeMap<String, DataOfObject>,
     /// Settings from fast to exact; `None` before a page asks for them.
@@ -127,6 +132,8 @@ pub(crate) struct Seen {
     pub(crate) effects: Option<Vec<EffectRow>>,
     /// How often values of volumes occur, by the names of the objects.
     pub(crate) curves: BTreeMap<String, Values>,
+    /// A box around all that was drawn, world units.
+    pub(crate) bounds: Option<DAabb>,
     /// Settings from fast to exact; `None` before a page asks for them.
     pub(crate) rungs: Option<Vec<RungRow>>,
 }
@@ -143,6 +150,7 @@ impl Desk {
             whole: None,
             depths: None,
             curves: BTreeMap::new(),
+            bounds: None,
             data: BTreeMap::new(),
             rungs: None,
             is_asked: false,
@@ -195,6 +203,7 @@ impl Desk {
             whole: papers.whole.as_ref().map(|whole| whole.generation),
             effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
             curves: papers.curves.clone(),
+            bounds: papers.bounds,
             rungs: papers.rungs.clone(),
         }
     }
@@ -280,6 +289,16 @@ impl Desk {
         self.tell(papers);
     }
 
+    /// Keeps a box around what was drawn, beside what was drawn before: a cut leaves less, and may go back.
+    pub(crate) fn keep_bounds(&self, bounds: DAabb) {
+        let mut papers = self.papers();
+        let whole = papers.bounds.map_or(bounds, |before| before.union(bounds));
+        if papers.bounds != Some(whole) {
+            papers.bounds = Some(whole);
+            self.tell(papers);
+        }
+    }
+
     /// Keeps how often values of a volume occur.
     pub(crate) fn keep_values(&self, object: &str, values: Values) {
         let mut papers = self.papers();
@@ -313,6 +332,7 @@ impl Desk {
 
     /// Forgets what is known of data.
     pub(crate) fn forget_values(&self) {
+        self.papers().bounds = None;
         let mut papers = self.papers();
         papers.curves.clear();
         papers.data.clear();

@@ -8,6 +8,12 @@ use serde::{Deserialize, Serialize};
 /// Largest number of a drag, in heights of the picture, and of steps of a wheel: more is no hand's.
 const MOST: f64 = 1000.0;
 
+/// Coordinates of the world lie between this and its negative.
+const FARTHEST: f64 = 1e18;
+
+/// The largest coordinate of a direction is this at least.
+const SHORTEST: f64 = 1e-6;
+
 /// Most stops by which a light is made brighter or darker: more is black, or burnt out.
 const MOST_STOPS: f64 = 32.0;
 
@@ -107,6 +113,18 @@ pub enum Event {
         /// Its control points by rising value, [`MOST_KNOTS`] at most; `None` for what the scene says.
         knots: Option<Vec<Knot>>,
     },
+    /// Sets the colour of an object.
+    Color {
+        /// Name of the object.
+        object: String,
+        /// Linear colour, each channel ≥ 0; `None` for what the scene says.
+        color: Option<[f64; 3]>,
+    },
+    /// Cuts objects open: all cuts of the view, in the place of those before.
+    Cuts {
+        /// The planes, [`MOST_CUTS`] at most. Cuts of the scene itself stay.
+        cuts: Vec<Cut>,
+    },
     /// Shows a layer of the picture in the place of the beauty.
     Layer {
         /// As scenes name it, such as `depth.median`; `None` for the beauty.
@@ -149,6 +167,21 @@ pub struct Knot {
     /// Extinction, 1/world unit, ≥ 0.
     pub extinction: f64,
 }
+
+/// A plane beyond which objects are cut away.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// Name of the object; `None` for every object.
+    pub object: Option<String>,
+    /// Direction to the side that is cut away, in the world; any length but 0.
+    pub normal: [f64; 3],
+    /// World position on the plane.
+    pub point: [f64; 3],
+}
+
+/// Most planes of a view.
+pub const MOST_CUTS: usize = 32;
 
 /// Most control points of a transfer function that is drawn by hand.
 pub const MOST_KNOTS: usize = 256;
@@ -193,7 +226,7 @@ impl Event {
                     return Err(bad("look_from", "distance", "a length between 1e-18 and 1e18", distance));
                 }
                 for number in centre.iter().flatten() {
-                    within("look_from", "centre", *number, 1e18)?;
+                    within("look_from", "centre", *number, FARTHEST)?;
                 }
                 Ok(())
             }
@@ -207,11 +240,17 @@ impl Event {
                 within("light_direction", "elevation", *elevation, 90.0)
             }
             Self::Transfer { knots: Some(knots), .. } => check_knots(knots),
+            Self::Color { color: Some(color), .. } => {
+                let wrong = color.iter().find(|channel| !(0.0..=MOST).contains(*channel));
+                wrong.map_or(Ok(()), |channel| Err(bad("color", "color", &format!("0 to {MOST}"), *channel)))
+            }
+            Self::Cuts { cuts } => check_cuts(cuts),
             Self::Accuracy { step, set } => {
                 within("accuracy", "step", f64::from(*step), f64::from(RUNGS_ASIDE))?;
                 settings(set).map(|_| ())
             }
-            Self::Transfer { knots: None, .. } | Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
+            Self::Transfer { knots: None, .. } | Self::Color { color: None, .. } => Ok(()),
+            Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
             Self::Technique { .. } => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
@@ -237,6 +276,25 @@ fn check_knots(knots: &[Knot]) -> Result<(), Error> {
         let numbers = [knot.value, knot.extinction].into_iter().chain(knot.color);
         if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
             return Err(bad("transfer", "knots", "finite numbers", number));
+        }
+    }
+    Ok(())
+}
+
+fn check_cuts(cuts: &[Cut]) -> Result<(), Error> {
+    if cuts.len() > MOST_CUTS {
+        let message = format!("`cuts`: expected at most {MOST_CUTS} planes, found {}", cuts.len());
+        return Err(Error::input("event `cuts`", message, ""));
+    }
+    for Cut { normal, point, .. } in cuts {
+        for number in normal {
+            within("cuts", "normal", *number, MOST)?;
+        }
+        if normal.iter().all(|number| number.abs() < SHORTEST) {
+            return Err(bad("cuts", "normal", &format!("a direction, not shorter than {SHORTEST}"), normal[0]));
+        }
+        for number in point {
+            within("cuts", "point", *number, FARTHEST)?;
         }
     }
     Ok(())
@@ -306,6 +364,10 @@ mod tests {
                 object: "head".into(),
                 knots: Some(vec![Knot { value: 30.5, color: [0.1, 0.2, 0.3], extinction: 2.0 }]),
             },
+            Event::Color { object: "c".into(), color: Some([0.25, 0.5, 1.0]) },
+            Event::Color { object: "c".into(), color: None },
+            Event::Cuts { cuts: vec![Cut { object: None, normal: [0.0, 1.0, 0.0], point: [0.5, 2.5, -1.0] }] },
+            Event::Cuts { cuts: Vec::new() },
             Event::Layer { layer: Some("normal".into()) },
             Event::Accuracy { step: -2, set: vec!["render.antialias=1".into(), "render.points.exact=false".into()] },
             Event::Technique { technique: Some("sheets".into()) },
@@ -319,6 +381,10 @@ mod tests {
         }
     }
 
+    fn cut(normal: [f64; 3], point: [f64; 3]) -> Cut {
+        Cut { object: None, normal, point }
+    }
+
     #[test]
     fn events_that_no_page_sends_are_refused() {
         for text in [
@@ -328,6 +394,9 @@ mod tests {
             r#"{"do": "orbit", "right": "1", "up": 0}"#,
             r#"{"do": "effect", "name": "shadow.a", "switch": "maybe"}"#,
             r#"{"do": "size", "width": -1, "height": 2}"#,
+            r#"{"do": "cuts", "cuts": [{"object": null, "normal": [0, 1], "point": [0, 0, 0]}]}"#,
+            r#"{"do": "cuts", "cuts": [{"object": null, "normal": [0, 1, 0]}]}"#,
+            r#"{"do": "color", "object": "a", "color": [1, 1]}"#,
             r#"{"right": 1, "up": 0}"#,
             "[]",
         ] {
@@ -345,6 +414,12 @@ mod tests {
             Event::LightIntensity { light: "a".into(), stops: 33.0 },
             Event::LightDirection { light: "a".into(), azimuth: 0.0, elevation: -91.0 },
             Event::Transfer { object: "a".into(), knots: Some(Vec::new()) },
+            Event::Color { object: "a".into(), color: Some([0.0, -1.0, 0.0]) },
+            Event::Color { object: "a".into(), color: Some([0.0, f64::NAN, 0.0]) },
+            Event::Cuts { cuts: vec![cut([0.0; 3], [0.0; 3])] },
+            Event::Cuts { cuts: vec![cut([0.0, f64::NAN, 1.0], [0.0; 3])] },
+            Event::Cuts { cuts: vec![cut([0.0, 1.0, 0.0], [0.0, 1e19, 0.0])] },
+            Event::Cuts { cuts: vec![cut([0.0, 1.0, 0.0], [0.0; 3]); MOST_CUTS + 1] },
             Event::Accuracy { step: 4, set: Vec::new() },
             Event::Accuracy { step: 1, set: vec!["object.a.mesh=b.ply".into()] },
             Event::Accuracy { step: 1, set: vec!["render.effects.shadow=off".into()] },

@@ -55,7 +55,7 @@ pub use accuracy::compare::{Comparison, KeptRow};
 pub use curve::{CurveRow, Values};
 pub use depths::PicturePlace;
 pub use depths::below::{Below, NamedValue};
-pub use event::{Event, Knot, MOST_KNOTS, Switch};
+pub use event::{Cut, Event, Knot, MOST_CUTS, MOST_KNOTS, Switch};
 pub use lights::{Direction, LightRow};
 pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};
 pub use recording::{MOST_EVENTS, Recording, read_events};

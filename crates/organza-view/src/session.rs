@@ -3,12 +3,12 @@
 use crate::accuracy::RungRow;
 use crate::accuracy::compare::{Comparison, Kept, KeptRow};
 use crate::artist::Artist;
-use crate::curve::CurveRow;
+use crate::curve::{CurveRow, number};
 use crate::depths::PicturePlace;
 use crate::depths::below::{Below, below};
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
-use crate::event::Event;
+use crate::event::{Cut, Event};
 use crate::lights::{LightRow, direction_of, kind_of as kind_of_light};
 use crate::picture::{Drawn, EffectRow, Facts, Level, Picture, Size};
 use crate::recording::Recording;
@@ -19,6 +19,7 @@ use organza::output::Format;
 use organza::scene::{self, Scene, SceneLight, SceneObject};
 use organza::{Context, Error, Progress};
 use serde::Serialize;
+use splat_core::{DAabb, Projection};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -54,6 +55,8 @@ struct Studio {
     source: Source,
     /// The scene as the command line has it.
     stated: Scene,
+    /// Its objects.
+    uncut: Arc<Vec<SceneObject>>,
     state: State,
     /// The scene of the state.
     scene: Scene,
@@ -84,6 +87,10 @@ pub struct Shown {
     pub objects: Vec<ObjectRow>,
     /// The lights of the scene, in its order.
     pub lights: Vec<LightRow>,
+    /// The planes that cut objects open, beside those of the scene.
+    pub cuts: Vec<Cut>,
+    /// The lowest and the highest corner of a box around everything, cut away or not, world units; `None` before the first picture.
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// The effects of the newest picture, with the present switches. The whole picture of the state counts as newest
     /// once it is drawn.
     pub effects: Vec<EffectRow>,
@@ -127,6 +134,29 @@ pub struct ShownViewpoint {
     pub distance: f64,
     /// World position in the middle of the picture.
     pub centre: [f64; 3],
+    /// Unit vector to the right of the picture, in the world.
+    pub right: [f64; 3],
+    /// Unit vector to its top.
+    pub up: [f64; 3],
+    /// Height of what the picture shows around the centre, world units.
+    pub height: f64,
+    /// Whether rays of the view are parallel.
+    pub is_parallel: bool,
+}
+
+impl ShownViewpoint {
+    fn new(viewpoint: &Viewpoint) -> Self {
+        Self {
+            azimuth: viewpoint.azimuth.to_degrees(),
+            elevation: viewpoint.elevation.to_degrees(),
+            distance: viewpoint.distance,
+            centre: viewpoint.centre.to_array(),
+            right: viewpoint.right().to_array(),
+            up: viewpoint.upwards().to_array(),
+            height: viewpoint.height(),
+            is_parallel: matches!(viewpoint.projection, Projection::Orthographic { .. }),
+        }
+    }
 }
 
 /// An object, as a row of the page.
@@ -140,6 +170,12 @@ pub struct ObjectRow {
     pub visible: bool,
     /// Opacity of one crossing, 0 to 1; `None` for a medium, which has none.
     pub opacity: Option<f64>,
+    /// The colour that it has by the scene or by the view, linear; `None` where its data tell it.
+    pub color: Option<[f64; 3]>,
+    /// Whether that is the view's.
+    pub is_recolored: bool,
+    /// Whether it can have a colour of its own: a volume and a slice have those of their values.
+    pub takes_color: bool,
     /// The transfer function of a volume.
     pub curve: Option<CurveRow>,
 }
@@ -174,8 +210,19 @@ impl Session {
         let thread = thread.map_err(|e| Error::Internal(format!("a thread that draws: {e}")))?;
         let state = State::default();
         let scene = stated.clone();
-        let studio =
-            Studio { title, source, stated, state, scene, generation: 0, edition: 0, is_on_disk, recording: None };
+        let uncut = Arc::new(stated.objects.clone());
+        let studio = Studio {
+            title,
+            source,
+            stated,
+            uncut,
+            state,
+            scene,
+            generation: 0,
+            edition: 0,
+            is_on_disk,
+            recording: None,
+        };
         let session =
             Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
         session.apply(&[])?;
@@ -334,13 +381,16 @@ impl Session {
     /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole, effects, curves, rungs } = self.desk.seen();
+        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, rungs } = self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
-        let row = |object: &SceneObject| ObjectRow {
+        let row = |(rank, object): (usize, &SceneObject)| ObjectRow {
             name: object.name.clone(),
             kind: kind_of(&object.source),
             visible: object.visible,
             opacity: (!object.source.is_medium()).then(|| studio.scene.opacity_of(object)),
+            color: object.color.map(|color| color.map(number)),
+            is_recolored: studio.state.is_recolored(rank),
+            takes_color: takes_color(object),
             curve: CurveRow::of_object(object, curves.get(&object.name)),
         };
         let light = |(rank, light): (usize, &SceneLight)| LightRow {
@@ -361,15 +411,12 @@ impl Session {
             generation: studio.generation,
             title: studio.title.clone(),
             size: Size::of_scene(&studio.scene),
-            viewpoint: ShownViewpoint {
-                azimuth: viewpoint.azimuth.to_degrees(),
-                elevation: viewpoint.elevation.to_degrees(),
-                distance: viewpoint.distance,
-                centre: viewpoint.centre.to_array(),
-            },
+            viewpoint: ShownViewpoint::new(&viewpoint),
             exposure: studio.scene.render.exposure,
-            objects: studio.scene.objects.iter().map(row).collect(),
+            objects: studio.scene.objects.iter().enumerate().map(row).collect(),
             lights: studio.scene.lights.iter().enumerate().map(light).collect(),
+            cuts: studio.state.cuts().to_vec(),
+            bounds: bounds.map(|DAabb { min, max }| [min.to_array(), max.to_array()]),
             effects: effects.iter().map(switched).collect(),
             layer: studio.state.layer().map(str::to_owned),
             accuracy: rungs.map(|rungs| ShownAccuracy {
@@ -484,6 +531,7 @@ impl Studio {
             generation: self.generation,
             scene: scene.clone(),
             stated,
+            uncut: Arc::clone(&self.uncut),
             accuracy: state.accuracy().clone(),
             told,
             edition: self.edition,
@@ -508,6 +556,7 @@ impl Studio {
         }
         let state = self.state.of_another_scene(&self.stated, &stated);
         self.source = source;
+        self.uncut = Arc::new(stated.objects.clone());
         self.stated = stated;
         Ok(state)
     }
@@ -517,6 +566,12 @@ impl Drop for Session {
     fn drop(&mut self) {
         self.close();
     }
+}
+
+/// Whether an object takes a colour: others have those of their values or of their labels.
+fn takes_color(object: &SceneObject) -> bool {
+    let has_values = matches!(object.source, scene::Source::Volume(_) | scene::Source::Slice(_));
+    !has_values && object.field.is_none() && object.labels.is_none()
 }
 
 /// What an object is made of, in a word.

@@ -1,12 +1,13 @@
 //! A person's changes to a scene, and the scene that follows from them.
 
-use crate::event::{Event, Knot, Switch, settings};
+use crate::event::{Cut, Event, Knot, Switch, settings};
 use crate::lights::{Aim, Direction, LightChange};
 use crate::picture::Size;
 use crate::viewpoint::Viewpoint;
 use organza::scene::{self, LoadOptions, Override, Scene, printable, shown};
 use organza::{Error, Files, InMemory, RenderOptions};
-use splat_core::{LightShape, MemoryAccount, Projection};
+use splat_core::glam::DVec3;
+use splat_core::{Clip, LightShape, MemoryAccount, Projection};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -95,6 +96,7 @@ impl Source {
 struct ObjectChange {
     visible: Option<bool>,
     opacity: Option<f64>,
+    color: Option<[f64; 3]>,
     knots: Option<Vec<Knot>>,
 }
 
@@ -126,6 +128,7 @@ pub(crate) struct State {
     /// The layer in the place of the beauty.
     layer: Option<String>,
     effects: BTreeMap<String, Switch>,
+    cuts: Vec<Cut>,
     technique: Option<String>,
     accuracy: Accuracy,
 }
@@ -134,6 +137,16 @@ impl State {
     /// The position between fast and exact.
     pub(crate) const fn accuracy(&self) -> &Accuracy {
         &self.accuracy
+    }
+
+    /// The planes that cut objects open, beside those of the scene.
+    pub(crate) fn cuts(&self) -> &[Cut] {
+        &self.cuts
+    }
+
+    /// Whether a colour was chosen for an object.
+    pub(crate) fn is_recolored(&self, object: usize) -> bool {
+        self.objects.get(&object).is_some_and(|change| change.color.is_some())
     }
 
     /// The technique that was chosen.
@@ -166,7 +179,9 @@ impl State {
             let label = &before.lights.get(*rank)?.label;
             Some((after.lights.iter().position(|light| light.label == *label)?, *change))
         };
+        let is_there = |name: &String| after.objects.iter().any(|object| object.name == *name);
         Self {
+            cuts: self.cuts.iter().filter(|cut| cut.object.as_ref().is_none_or(is_there)).cloned().collect(),
             objects: self.objects.iter().filter_map(object).collect(),
             lights: self.lights.iter().filter_map(light).collect(),
             ..self.clone()
@@ -225,6 +240,17 @@ impl State {
                 }
                 self.change(scene, object)?.knots.clone_from(knots);
             }
+            Event::Color { object, color } => self.change(scene, object)?.color = *color,
+            Event::Cuts { cuts } => {
+                cuts.iter()
+                    .filter_map(|cut| cut.object.as_ref())
+                    .try_for_each(|name| rank_of(scene, name).map(|_| ()))?;
+                self.cuts.clone_from(cuts);
+                // A camera that the data place would follow what is left.
+                if scene.fit.is_some() {
+                    self.viewpoint.get_or_insert(*first);
+                }
+            }
             Event::Layer { layer } => self.layer.clone_from(layer),
             Event::Technique { technique } => {
                 self.technique.clone_from(technique);
@@ -239,13 +265,7 @@ impl State {
     }
 
     fn change(&mut self, scene: &Scene, name: &str) -> Result<&mut ObjectChange, Error> {
-        let rank = scene.objects.iter().position(|object| object.name == name);
-        let rank = rank.ok_or_else(|| {
-            let names: Vec<String> = scene.objects.iter().map(|object| format!("`{}`", shown(&object.name))).collect();
-            let hint = format!("the scene has {}", names.join(", "));
-            Error::input("event", format!("expected the name of an object, found `{}`", shown(name)), hint)
-        })?;
-        Ok(self.objects.entry(rank).or_default())
+        Ok(self.objects.entry(rank_of(scene, name)?).or_default())
     }
 
     fn change_light(&mut self, scene: &Scene, label: &str) -> Result<&mut LightChange, Error> {
@@ -279,8 +299,19 @@ impl State {
             if let Some(opacity) = change.opacity {
                 changes.push(Override::parse(&format!("object.{key}.opacity={opacity:?}"))?);
             }
+            if let Some(color) = &change.color {
+                changes.push(Override::parse(&format!("object.{key}.color={color:?}"))?);
+            }
             if let Some(knots) = &change.knots {
                 changes.push(Override::parse(&format!("object.{key}.transfer={}", transfer(knots)))?);
+            }
+        }
+        for (rank, object) in scene.objects.iter().enumerate() {
+            let is_of = |cut: &&Cut| cut.object.as_ref().is_none_or(|name| *name == object.name);
+            let cuts: Vec<&Cut> = self.cuts.iter().filter(is_of).collect();
+            if !cuts.is_empty() {
+                let key = key_of(scene, rank);
+                changes.push(Override::parse(&format!("object.{key}.clip={}", clip(object, &cuts)))?);
             }
         }
         let is_turned = self.lights.values().any(|change| change.direction.is_some());
@@ -316,12 +347,39 @@ impl State {
     }
 }
 
+/// The rank of the object of this name.
+fn rank_of(scene: &Scene, name: &str) -> Result<usize, Error> {
+    let rank = scene.objects.iter().position(|object| object.name == name);
+    rank.ok_or_else(|| {
+        let names: Vec<String> = scene.objects.iter().map(|object| format!("`{}`", shown(&object.name))).collect();
+        let hint = format!("the scene has {}", names.join(", "));
+        Error::input("event", format!("expected the name of an object, found `{}`", shown(name)), hint)
+    })
+}
+
 /// An object as a path of keys names it: by its name where that is a plain word, else by its rank.
 fn key_of(scene: &Scene, rank: usize) -> String {
     let name = scene.objects.get(rank).map_or("", |object| object.name.as_str());
     let is_plain = |c: char| c.is_alphanumeric() || "_-".contains(c);
     let is_word = !name.is_empty() && name.chars().all(is_plain) && name.parse::<usize>().is_err();
     if is_word { name.to_owned() } else { rank.to_string() }
+}
+
+/// Regions that an object is kept in: its own, and one for each cut, in the coordinates of its source.
+fn clip(object: &scene::SceneObject, cuts: &[&Cut]) -> String {
+    let half_space =
+        |normal: DVec3, point: DVec3| format!("{{ normal = {:?}, point = {:?} }}", normal.to_array(), point.to_array());
+    let own = object.clip.iter().map(|clip| match clip {
+        Clip::HalfSpace { normal, offset } => half_space(*normal, *normal * (offset / normal.length_squared())),
+        Clip::Box(bounds) => format!("{{ box = [{:?}, {:?}] }}", bounds.min.to_array(), bounds.max.to_array()),
+    });
+    let transform = &object.transform;
+    let back = transform.rotation.inverse();
+    let of_view = cuts.iter().map(|cut| {
+        let point = back * (DVec3::from(cut.point) - transform.translation) / transform.scale;
+        half_space(back * DVec3::from(cut.normal), point)
+    });
+    format!("[{}]", own.chain(of_view).collect::<Vec<_>>().join(", "))
 }
 
 /// Control points as a scene has them.
@@ -474,6 +532,63 @@ mod tests {
     }
 
     #[test]
+    fn a_cut_is_where_it_is_in_the_world_and_cuts_of_the_scene_stay() {
+        let text = SCENE.replace(
+            "name = \"fog\"",
+            "name = \"fog\"\ntransform = { scale = 2, rotate = [0, 0, 90], translate = [1, 2, 3] }\n\
+             clip = [{ normal = [0, 0, 2], point = [0, 0, 0.25] }, { box = [[-1, -1, -0.5], [1, 0.75, 1]] }]",
+        );
+        let Opening { file, text, load, .. } = Opening::of_text("a.toml", text, RenderOptions::default());
+        let source = Source { file, text, load };
+        let scene = source.scene(Vec::new()).unwrap();
+        let cut = |object: Option<&str>, point: [f64; 3]| Cut {
+            object: object.map(str::to_owned),
+            normal: [1.0, 2.0, 0.0],
+            point,
+        };
+        let changed = |cuts: Vec<Cut>| {
+            let mut state = State::default();
+            state.apply(&Event::Cuts { cuts }, &scene, &Viewpoint::of_scene(&scene)).unwrap();
+            source.scene(source.overrides(&state, &scene).unwrap()).unwrap()
+        };
+        let both = changed(vec![cut(None, [0.5, 2.0, 9.0]), cut(Some("fog"), [2.0, 2.0, 2.0])]);
+        assert_eq!(both.objects.iter().map(|object| object.clip.len()).collect::<Vec<_>>(), [1, 1, 4]);
+        let fog = &both.objects[2];
+        assert_eq!(fog.clip[1], scene.objects[2].clip[1]);
+        for k in 0..1000 {
+            let number = |seed: u64| 2.0 * splat_core::rng::unit(seed, 0, k, 0) - 1.0;
+            let place = DVec3::new(number(1), number(2), number(3));
+            let world = fog.transform.apply(place);
+            let is_kept = |point: DVec3| DVec3::new(1.0, 2.0, 0.0).dot(world - point) <= 0.0;
+            assert_eq!(fog.clip[2].keeps(place), is_kept(DVec3::new(0.5, 2.0, 9.0)), "{place}");
+            assert_eq!(fog.clip[3].keeps(place), is_kept(DVec3::splat(2.0)), "{place}");
+            assert_eq!(fog.clip[0].keeps(place), place.z <= 0.25, "{place}");
+        }
+        assert_eq!(changed(Vec::new()), scene);
+    }
+
+    #[test]
+    fn a_camera_that_the_data_place_does_not_follow_a_cut() {
+        let text = SCENE.replace("position = [0, 1, 4]\n        target = [0, 0, 0]\n        fov_y = 35", "auto = true");
+        let Opening { file, text, load, .. } = Opening::of_text("a.toml", text, RenderOptions::default());
+        let scene = Source { file, text, load }.scene(Vec::new()).unwrap();
+        assert!(scene.fit.is_some());
+        let first = Viewpoint::of_scene(&after(&[]).unwrap());
+        let mut state = State::default();
+        state.apply(&Event::Exposure { stops: 1.0 }, &scene, &first).unwrap();
+        assert_eq!(state.viewpoint(), None);
+        state.apply(&Event::Cuts { cuts: Vec::new() }, &scene, &first).unwrap();
+        assert_eq!(state.viewpoint(), Some(&first));
+    }
+
+    #[test]
+    fn an_object_has_the_colour_that_was_chosen() {
+        let color = |color| Event::Color { object: "pane".into(), color };
+        assert_eq!(after(&[color(Some([0.25, 0.5, 1.0]))]).unwrap().objects[0].color, Some([0.25, 0.5, 1.0]));
+        assert_eq!(after(&[color(Some([0.25, 0.5, 1.0])), color(None)]).unwrap(), after(&[]).unwrap());
+    }
+
+    #[test]
     fn a_technique_is_that_of_every_object() {
         let text = SCENE.replace(
             "spacing = 0.1 }\n        [[object]]\n        name = \"fog\"",
@@ -519,6 +634,8 @@ mod tests {
                 object: "pane".into(),
                 knots: Some(vec![Knot { value: 0.0, color: [1.0; 3], extinction: 1.0 }]),
             },
+            Event::Color { object: "nobody".into(), color: None },
+            Event::Cuts { cuts: vec![Cut { object: Some("nobody".into()), normal: [0.0, 1.0, 0.0], point: [0.0; 3] }] },
             Event::Layer { layer: Some("no\"thing".into()) },
             Event::Size { width: 0, height: 4 },
             Event::Orbit { right: f64::NAN, up: 0.0 },

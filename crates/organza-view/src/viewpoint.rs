@@ -76,7 +76,7 @@ impl Viewpoint {
     }
 
     /// Unit vector across the view towards the upper pole.
-    fn upwards(&self) -> DVec3 {
+    pub(crate) fn upwards(&self) -> DVec3 {
         let (sine, cosine) = sincos(self.elevation);
         self.pole * cosine - self.level() * sine
     }
@@ -89,7 +89,7 @@ impl Viewpoint {
     }
 
     /// Unit vector to the right of the picture.
-    fn right(&self) -> DVec3 {
+    pub(crate) fn right(&self) -> DVec3 {
         let frame = Frame::around(self.pole);
         let (sine, cosine) = sincos(self.azimuth);
         frame.quarter * cosine - frame.zero * sine

@@ -31,7 +31,7 @@ use object::Prepared;
 pub(crate) use object_context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
 use own::Own;
 use splat_core::shade::Census;
-use splat_core::{Camera, Cloud, FootprintStack, Material, Object, Shading, SplatKind};
+use splat_core::{Camera, Clip, Cloud, DAabb, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
 
 /// A scene in memory, normalized by a power of two (see [`Loaded::exponent`]) and ready for a technique.
@@ -76,10 +76,13 @@ pub struct Loaded {
     pub scales: Vec<ColorScale>,
 }
 
-/// All splats, while a share of them stands for them.
+/// All splats, while some of them stand for them, and what is told of their objects.
 pub(crate) struct Everything {
     cloud: Cloud,
     splats: Vec<SplatCount>,
+    statistics: Vec<ObjectStatistics>,
+    planned: Vec<PlannedObject>,
+    convertible: Vec<u64>,
 }
 
 impl Loaded {
@@ -89,6 +92,13 @@ impl Loaded {
         self.camera = scene.camera;
         self.camera.scale_world(libm::exp2(f64::from(self.exponent)).recip());
         self.slice_thickness = scaled_thickness(scene, self.exponent);
+    }
+
+    /// A box around all splats and objects, world units; empty where there is nothing.
+    pub(crate) fn bounds(&self) -> DAabb {
+        let DAabb { min, max } = normalize::bounds(&self.cloud, &self.own);
+        let scale = libm::exp2(f64::from(self.exponent));
+        DAabb::new(min * scale, max * scale)
     }
 
     /// Takes the lights from a scene that differs from the loaded one in camera, lights and render settings alone, and what is known of its sources in these lights;
@@ -106,17 +116,66 @@ impl Loaded {
             return None;
         }
         let fewer = self.cloud.fewer(share);
-        let splats = self.splats.clone();
-        count_anew(&mut self.splats, &fewer, &self.objects);
-        Some(Everything { cloud: std::mem::replace(&mut self.cloud, fewer), splats })
+        Some(self.put_aside(fewer))
     }
 
-    /// Takes back the splats of which it kept a share.
+    /// Has other splats stand for all of them.
+    fn put_aside(&mut self, fewer: Cloud) -> Everything {
+        let everything = Everything {
+            cloud: std::mem::replace(&mut self.cloud, fewer),
+            splats: self.splats.clone(),
+            statistics: self.statistics.clone(),
+            planned: self.planned.clone(),
+            convertible: self.convertible.clone(),
+        };
+        count_anew(&mut self.splats, &self.cloud, &self.objects);
+        everything
+    }
+
+    /// Takes back the splats of which it kept some.
     pub(crate) fn take_back(&mut self, everything: Option<Everything>) {
-        if let Some(Everything { cloud, splats }) = everything {
+        if let Some(Everything { cloud, splats, statistics, planned, convertible }) = everything {
             self.cloud = cloud;
             self.splats = splats;
+            self.statistics = statistics;
+            self.planned = planned;
+            self.convertible = convertible;
         }
+    }
+
+    /// Keeps a share of the splats whose middles lie in what a scene shows, which differs from the loaded one in that objects are hidden or cut; gives back
+    /// all of them. `None` where it shows more than was loaded, or more than splats.
+    pub(crate) fn keep_shown(&mut self, loaded_of: &Scene, scene: &Scene, share: f64) -> Option<Everything> {
+        let mut pairs = loaded_of.objects.iter().zip(&scene.objects);
+        let is_part = pairs.all(|(whole, part)| (whole.visible || !part.visible) && part.clip.starts_with(&whole.clip));
+        if !self.own.is_empty() || loaded_of.objects.len() != scene.objects.len() || !is_part {
+            return None;
+        }
+        let scale = libm::exp2(f64::from(self.exponent)).recip();
+        let borders = scene.objects.iter().zip(&loaded_of.objects).map(|(part, whole)| {
+            let regions = part.clip[whole.clip.len()..].iter().flat_map(Clip::half_spaces);
+            let in_world = regions.map(|(normal, offset)| {
+                let normal = part.transform.rotation * normal;
+                (normal, scale * (offset * part.transform.scale + normal.dot(part.transform.translation)))
+            });
+            in_world.collect::<Vec<_>>()
+        });
+        let borders: Vec<_> = borders.collect();
+        let is_shown = |i: &u32| {
+            let object = self.cloud.object[*i as usize] as usize;
+            let place = self.cloud.origin + self.cloud.position[*i as usize].as_dvec3();
+            scene.objects[object].visible && borders[object].iter().all(|(normal, offset)| normal.dot(place) <= *offset)
+        };
+        let shown: Vec<u32> = (0..self.cloud.len() as u32).filter(is_shown).collect();
+        let shown = self.cloud.gather(&shown);
+        let everything = self.put_aside(if share < 1.0 { shown.fewer(share) } else { shown });
+        let visible = loaded_of.objects.iter().zip(&scene.objects).filter(|(whole, _)| whole.visible);
+        let stays: Vec<bool> = visible.map(|(_, part)| part.visible).collect();
+        keep(&mut self.statistics, &stays);
+        keep(&mut self.planned, &stays);
+        keep(&mut self.splats, &stays);
+        keep(&mut self.convertible, &stays);
+        Some(everything)
     }
 
     /// Takes out what a scene lacks which differs from the loaded one in that some objects are not visible, and in what materials say. Returns

@@ -9,20 +9,21 @@ use crate::choose::{row, techniques};
 use crate::cost::Prediction;
 use crate::device::Helper;
 use crate::frame::{Frame, KeptGroups, Leaves};
-use crate::load::Loaded;
 use crate::load::files::Files;
+use crate::load::{Everything, Loaded};
 use crate::plan::Plan;
 use crate::predict::prediction;
 use crate::prepare::ranges::ranges;
 use crate::prepare::{
-    Explanation, EyeMap, Planned, Prepared, plan_alone, prepare, same_splats, settled, splats_serve, turned,
+    Explanation, EyeMap, Planned, Prepared, load_measured, plan_alone, prepare, same_splats, settled, splats_serve,
+    turned,
 };
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Fold, Kept, Session, Sets};
 use crate::{Context, CostRecord, Error, Layers, Progress, RenderOptions, warnings};
 use convert::ColorScale;
 use draw::draw;
-use splat_core::Arrived;
+use splat_core::{Arrived, DAabb};
 use std::path::PathBuf;
 
 /// A finished render.
@@ -93,6 +94,8 @@ pub(crate) struct Left {
     is_still: bool,
     /// Whether frames are previews, which have no map of the eye.
     pub(crate) is_preview: bool,
+    /// Of what the next preview shows a part.
+    pub(crate) whole: Option<Scene>,
 }
 
 /// What was made of the last frame's scene.
@@ -101,6 +104,21 @@ struct Made {
     loaded: Loaded,
     planned: Planned,
     leaves: Leaves,
+    uncut: Option<Uncut>,
+}
+
+/// What splats of a preview were made of, before objects were hidden or cut.
+struct Uncut {
+    scene: Scene,
+    everything: Everything,
+}
+
+/// What was made of another frame, as far as it serves a frame.
+#[derive(Default)]
+struct Served {
+    made: Option<(Loaded, Option<Planned>)>,
+    leaves: Leaves,
+    uncut: Option<Uncut>,
 }
 
 impl Left {
@@ -109,6 +127,11 @@ impl Left {
         if techniques(frame).into_iter().any(|technique| row(technique).is_random) {
             self.sets.add(frame);
         }
+    }
+
+    /// A box around all that the last frame was made of, world units.
+    pub(crate) fn bounds(&self) -> Option<DAabb> {
+        Some(self.made.as_ref()?.loaded.bounds())
     }
 
     /// Share of the allowed memory that files may take, and light that is remembered.
@@ -123,14 +146,19 @@ impl Left {
     }
 
     /// Takes what was made of another frame, as far as it serves this one.
-    fn take_made(&mut self, scene: &Scene) -> (Option<(Loaded, Option<Planned>)>, Leaves) {
+    fn take_made(&mut self, scene: &Scene, max_memory: u64) -> Served {
         // What serves no longer makes room.
         match self.made.take() {
-            Some(made) if turned(&made.scene, scene) => (Some((made.loaded, Some(made.planned))), made.leaves),
-            Some(made) if splats_serve(&made.scene, scene, &made.loaded) => {
-                (Some((made.loaded, None)), Leaves::default())
+            Some(Made { scene: before, loaded, planned, leaves, uncut }) if turned(&before, scene) => {
+                Served { made: Some((loaded, Some(planned))), leaves, uncut }
             }
-            _ => Default::default(),
+            Some(Made { scene: before, loaded, uncut, .. }) if splats_serve(&before, scene, &loaded) => {
+                Served { made: Some((loaded, None)), uncut, ..Served::default() }
+            }
+            Some(made) if self.is_preview && made.loaded.cloud.bytes() <= max_memory / Self::SHARE => {
+                preview_of_part(made, scene).unwrap_or_default()
+            }
+            _ => Served::default(),
         }
     }
 
@@ -145,6 +173,47 @@ impl Left {
             self.files = self.files.emptied();
         }
         self.sets.allow(max_memory, other + self.files.bytes());
+    }
+}
+
+/// Splats of a frame of which another hides or cuts objects, or shows them again, or has fewer splats: those whose middles it shows. Cuts are as rough as
+/// splats, and have no lids.
+fn preview_of_part(made: Made, scene: &Scene) -> Option<Served> {
+    let Made { scene: before, mut loaded, uncut, .. } = made;
+    let Some(Uncut { scene: whole, everything }) = uncut else { return part_of(before, loaded, scene) };
+    loaded.take_back(Some(everything));
+    part_of(whole, loaded, scene)
+}
+
+/// The part of a loaded scene that another shows.
+fn part_of(whole: Scene, mut loaded: Loaded, scene: &Scene) -> Option<Served> {
+    let share = scene.render.splat_share / whole.render.splat_share;
+    if share > 1.0 {
+        return None;
+    }
+    let everything = loaded.keep_shown(&whole, scene, share)?;
+    let mut part = whole.clone();
+    part.render.splat_share = scene.render.splat_share;
+    for (object, shown) in part.objects.iter_mut().zip(&scene.objects) {
+        object.visible = shown.visible;
+        object.clip.clone_from(&shown.clip);
+    }
+    splats_serve(&part, scene, &loaded).then(|| Served {
+        made: Some((loaded, None)),
+        uncut: Some(Uncut { scene: whole, everything }),
+        leaves: Leaves::default(),
+    })
+}
+
+/// The part that a preview shows of a scene that is loaded for it; nothing where that takes too much memory.
+///
+/// # Errors
+/// As [`crate::render`].
+fn load_part(whole: Scene, scene: &Scene, context: Context<'_>, cost: &mut CostRecord) -> Result<Served, Error> {
+    match load_measured(&whole, context, cost) {
+        Ok(loaded) => Ok(part_of(whole, loaded, scene).unwrap_or_default()),
+        Err(Error::Limit(_)) => Ok(Served::default()),
+        Err(error) => Err(error),
     }
 }
 
@@ -195,7 +264,12 @@ pub(crate) fn render_keeping(
     };
     let mut checkpoint = options.checkpoint.as_ref().map(open).transpose()?;
     let helper = options.device.as_deref().map(Helper::new);
-    let (made, mut leaves) = left.take_made(scene);
+    let mut served = left.take_made(scene, options.max_memory);
+    let mut loading = CostRecord::default();
+    if let Some(whole) = left.whole.take().filter(|whole| served.made.is_none() && whole.objects != scene.objects) {
+        served = load_part(whole, scene, Context { files: &left.files, options, progress }, &mut loading)?;
+    }
+    let Served { made, mut leaves, uncut } = served;
     let stated = scene;
     let Prepared { scene, loaded, planned, explanation } =
         prepare(stated, Context { files: &left.files, options, progress }, made, left.eye_map())?;
@@ -205,6 +279,7 @@ pub(crate) fn render_keeping(
     let remembers = left.remembers(&loaded, plan, options.max_memory, bytes);
     left.fit(options.max_memory, bytes + remembers.unwrap_or(0));
     let Explanation { plan: shown, mut cost, mut warnings, notes, .. } = explanation;
+    cost.stages.splice(0..0, loading.stages);
     // Do not warn of an empty picture if loading has already warned of the reason.
     let is_empty = loaded.cloud.is_empty() && loaded.own.is_empty();
     let has_reason = is_empty || warnings.len() > loaded.warnings.len();
@@ -235,7 +310,8 @@ pub(crate) fn render_keeping(
         Err(error) => {
             // What was made before a stop serves the next frame, which begins with it.
             let leaves = frame.leaves();
-            left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
+            left.made =
+                (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves, uncut });
             return Err(error);
         }
     };
@@ -256,7 +332,7 @@ pub(crate) fn render_keeping(
     warnings.extend(helper.as_ref().and_then(|_| left_to_processor(plan)));
     warnings.extend(helper.map(|helper| helper.said()).unwrap_or_default());
     let scales = loaded.scales.clone();
-    left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves });
+    left.made = (!left.is_still && is_whole).then(|| Made { scene: stated.clone(), loaded, planned, leaves, uncut });
     Ok(Render { layers, cost, plan: shown, predicted, sets, warnings, notes, scales, found, backend })
 }
 
@@ -268,11 +344,11 @@ pub(crate) fn prepare_keeping(
     left: &mut Left,
 ) -> Result<(), Error> {
     let (scene, _) = settled(scene, Context { files: &left.files, options, progress })?;
-    let (made, leaves) = left.take_made(&scene);
+    let Served { made, leaves, uncut } = left.take_made(&scene, options.max_memory);
     let Prepared { loaded, planned, .. } =
         prepare(&scene, Context { files: &left.files, options, progress }, made, left.eye_map())?;
     let is_whole = planned.plan.left_out.is_empty();
-    left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves });
+    left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves, uncut });
     Ok(())
 }
 

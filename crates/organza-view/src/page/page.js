@@ -20,7 +20,7 @@ function add(event) {
   const last = waiting[waiting.length - 1];
   const adds = { orbit: ["right", "up"], pan: ["right", "up"], zoom: ["steps"] }[event.do];
   const replaces = {
-    exposure: [], size: [], opacity: ["object"], transfer: ["object"], light_intensity: ["light"], light_direction: ["light"],
+    exposure: [], size: [], cuts: [], opacity: ["object"], color: ["object"], transfer: ["object"], light_intensity: ["light"], light_direction: ["light"],
   }[event.do];
   if (last && adds && last.do === event.do) {
     for (const key of adds) last[key] += event[key];
@@ -138,6 +138,7 @@ function show(found, isAgain = false) {
   at("title").title = found.title;
   showStatus(found);
   showObjects(found.objects);
+  showCuts(found);
   showLights(found.lights);
   showEffects(found.effects);
   showAccuracy(found);
@@ -237,6 +238,11 @@ function showObjects(objects) {
       row.value.textContent = object.opacity.toFixed(2);
       row.opacity.disabled = !object.visible;
     }
+    if (row.color) {
+      row.color.classList.toggle("unset", object.color === null);
+      if (document.activeElement !== row.color) row.color.value = hexOf(object.color || [0.6, 0.6, 0.6]);
+      row.uncolored.hidden = !object.is_recolored;
+    }
     if (row.curve) row.curve.show(object.curve);
   });
 }
@@ -259,6 +265,13 @@ function makeObject(object) {
       add({ do: "opacity", object: object.name, opacity: Number(row.opacity.value) });
     });
     children.push(element("span", { className: "opacity" }, [element("span", { textContent: "Opacity" }), row.opacity, row.value]));
+  }
+  if (object.takes_color) {
+    row.color = element("input", { type: "color", "aria-label": `Colour of ${object.name}` });
+    row.color.addEventListener("input", () => add({ do: "color", object: object.name, color: linearOf(row.color.value) }));
+    row.uncolored = element("button", { type: "button", textContent: "as in the scene", "aria-label": `Colour of ${object.name} as in the scene` });
+    row.uncolored.addEventListener("click", () => add({ do: "color", object: object.name, color: null }));
+    children.push(element("span", { className: "color" }, [element("span", { textContent: "Colour" }), row.color, row.uncolored]));
   }
   if (object.curve) {
     row.curve = new Curve(object.name, (knots) => add({ do: "transfer", object: object.name, knots }));

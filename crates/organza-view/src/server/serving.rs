@@ -43,6 +43,7 @@ const POLICY_OF_THIS_MACHINE: &str = "default-src 'none'; script-src 'self'; sty
 const PAGE: &str = include_str!("../page/page.html");
 const SCRIPT: &str = include_str!("../page/page.js");
 const CURVE: &str = include_str!("../page/curve.js");
+const CUT: &str = include_str!("../page/cut.js");
 const JUDGE: &str = include_str!("../page/judge.js");
 const SAVE: &str = include_str!("../page/save.js");
 const STYLE: &str = include_str!("../page/page.css");
@@ -137,6 +138,7 @@ impl<'p> Route<'p> {
             "" => Self::Page,
             "page.js" => Self::Script(SCRIPT),
             "curve.js" => Self::Script(CURVE),
+            "cut.js" => Self::Script(CUT),
             "judge.js" => Self::Script(JUDGE),
             "save.js" => Self::Script(SAVE),
             "page.css" => Self::Style,

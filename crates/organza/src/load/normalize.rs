@@ -15,7 +15,7 @@ pub(super) fn normalize(
     lights: &mut [SceneLight],
     slides: &mut [Option<Slide>],
 ) -> i32 {
-    let diagonal = diagonal(cloud, natives);
+    let diagonal = bounds(cloud, natives).diagonal();
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return 0;
     }
@@ -31,13 +31,10 @@ pub(super) fn normalize(
     exponent
 }
 
-/// Of the bounds of all splats and objects.
-fn diagonal(cloud: &Cloud, natives: &[Own]) -> f64 {
+/// The bounds of all splats and objects; empty where there is nothing.
+pub(super) fn bounds(cloud: &Cloud, natives: &[Own]) -> DAabb {
     let bounds = cloud.bounds();
-    if natives.is_empty() {
-        return f64::from(bounds.diagonal());
-    }
     // Nothing stays nothing: its corners are infinite.
     let splats = DAabb::new(cloud.origin + bounds.min.as_dvec3(), cloud.origin + bounds.max.as_dvec3());
-    natives.iter().map(Own::world_box).fold(splats, DAabb::union).diagonal()
+    natives.iter().map(Own::world_box).fold(splats, DAabb::union)
 }

@@ -279,7 +279,8 @@ impl Search<'_> {
         let Drawing { scene, options, progress } = self.drawing;
         let reading = self.cost.stages.iter().filter(|stage| stage.name == pass::READ).map(|stage| stage.seconds);
         let reading = reading.sum::<f64>();
-        let made = Made { scene: resolved.clone(), loaded: self.loaded, planned, leaves: Leaves::default() };
+        let made =
+            Made { scene: resolved.clone(), loaded: self.loaded, planned, leaves: Leaves::default(), uncut: None };
         let mut left = Left { files, is_still: true, made: Some(made), ..Left::default() };
         let mut render = render_keeping(&resolved, options, progress, &mut left)?;
         let taken = self.begun.elapsed().as_secs_f64() - reading;

@@ -4,6 +4,7 @@ use crate::load::files::Files;
 use crate::render::{Foreseen, Left, plan_keeping, prepare_keeping, render_keeping};
 use crate::scene::Scene;
 use crate::{Error, Progress, Render, RenderOptions};
+use splat_core::DAabb;
 
 /// Draws the frames of an animation.
 ///
@@ -81,10 +82,33 @@ impl Sequence {
         &self.left.files
     }
 
+    /// A box around all that the last frame was made of, in view or not, world units; `None` where it was made of nothing.
+    pub fn bounds(&self) -> Option<DAabb> {
+        self.left.bounds().filter(|bounds| !bounds.is_empty())
+    }
+
     /// Also a frame that will be drawn: all are added before the first is drawn, with the camera that [`crate::fitted`] finds. Little is
     /// kept of it.
     pub fn add(&mut self, frame: &Scene) {
         self.left.add(frame);
+    }
+
+    /// Draws a preview of a scene that hides or cuts objects of another one, `whole`, and differs from it in nothing else. Splats are made of the whole, so
+    /// that the next cut needs no others: cuts are as rough as splats, and have no lids.
+    ///
+    /// # Errors
+    /// As [`crate::render`].
+    pub fn preview(
+        &mut self,
+        frame: &Scene,
+        whole: &Scene,
+        options: &RenderOptions,
+        progress: &Progress,
+    ) -> Result<Render, Error> {
+        self.left.whole = Some(whole.clone());
+        let render = self.render(frame, options, progress);
+        self.left.whole = None;
+        render
     }
 
     /// Reads, converts and plans a frame without drawing it: a frame that would be refused is refused here.
@@ -197,6 +221,54 @@ mod tests {
                 let is_read = kept.cost.stages.iter().any(|stage| stage.name == crate::pass::READ);
                 assert_eq!(!is_read, serves, "{technique}: {changes:?}");
             }
+        }
+    }
+
+    /// Radiance by which pictures of the same splats differ at most, whatever these are counted from.
+    const ALIKE: f32 = 2e-3;
+
+    #[test]
+    fn previews_of_parts_are_made_of_the_splats_of_the_whole() {
+        // As previews are planned: for all views, so that what nobody sees in one of them stays.
+        let turning = |changes: &[&str]| Scene { frames: Some(2), ..changed(changes) };
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let mut sequence = Sequence::of_previews(Files::default());
+        let mut preview = |changes: &[&str]| {
+            let share = changes.iter().filter(|change| change.contains("share")).copied().collect::<Vec<_>>();
+            sequence.preview(&turning(changes), &turning(&share), &options, &progress).unwrap()
+        };
+        let alone = |changes: &[&str]| {
+            Sequence::of_previews(Files::default()).render(&turning(changes), &options, &progress).unwrap()
+        };
+        let cut = "object.fog.clip=[{ normal = [1, 0, 0], point = [0, 0, 0] }]";
+        let more = "object.fog.clip=[{ normal = [1, 0, 0], point = [0.25, 0, 0] }]";
+        let nothing = "object.fog.clip=[{ normal = [1, 0, 0], point = [-5, 0, 0] }]";
+        // A plane between splats leaves out those of one side. Those of another box are rounded about another origin, and have other cells of shadow maps.
+        let differ = |a: &Render, b: &Render| {
+            let values =
+                |render: &Render| render.layers.rgb("beauty").unwrap().iter().flatten().copied().collect::<Vec<_>>();
+            values(a).iter().zip(values(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        let half = preview(&[cut]);
+        assert!(has_pass(&half, crate::pass::READ), "what was read for the whole counts");
+        assert!(differ(&half, &alone(&["object.fog.medium_box.max=[0, 1, 1]"])) < ALIKE);
+        assert!(differ(&half, &alone(&[])) > 10.0 * ALIKE);
+        for (changes, same) in [
+            (&[more][..], &["object.fog.medium_box.max=[0.25, 1, 1]"][..]),
+            (&[nothing], &["object.fog.visible=false"]),
+            (&["object.pane.visible=false"], &["object.pane.visible=false"]),
+            (
+                &[cut, "object.pane.visible=false"],
+                &["object.fog.medium_box.max=[0, 1, 1]", "object.pane.visible=false"],
+            ),
+            (&["render.splat_share=0.5"], &["render.splat_share=0.5"]),
+            (&[], &[]),
+        ] {
+            let part = preview(changes);
+            assert!(!has_pass(&part, crate::pass::READ), "{changes:?}");
+            let difference = differ(&part, &alone(same));
+            assert!(difference < ALIKE, "{changes:?}: {difference}");
         }
     }
 
