@@ -85,5 +85,9 @@ mod whole_fields;
 /// What takes long and rarely fails where the others hold: `cargo xtask deep`.
 mod deep {
     #[cfg(target_os = "linux")]
+    mod chromium;
+    #[cfg(target_os = "linux")]
     mod every_scene;
+    #[cfg(target_os = "linux")]
+    mod page;
 }

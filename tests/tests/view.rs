@@ -6,18 +6,18 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-const FOG: &str = "[[object]]\nname = \"fog\" # thin\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }\n\
+pub(crate) const FOG: &str = "[[object]]\nname = \"fog\" # thin\nmedium_box = { min = [-1, -1, -1], max = [1, 1, 1], extinction = 1.5, spacing = 0.25 }\n\
                    [[object]]\nname = \"pane\"\nrectangle = { center = [0, 0, 0.5], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.1 }\n";
 
 /// A view that is running.
-struct View {
-    child: Child,
+pub(crate) struct View {
+    pub(crate) child: Child,
     address: String,
     token: String,
 }
 
 impl View {
-    fn start(place: &Place, arguments: &[&str]) -> Self {
+    pub(crate) fn start(place: &Place, arguments: &[&str]) -> Self {
         let mut command = organza();
         command.current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -26,6 +26,11 @@ impl View {
         let rest = line.trim().strip_prefix("http://").unwrap_or_else(|| panic!("an address, not {line:?}"));
         let (address, token) = rest.trim_end_matches('/').split_once('/').unwrap();
         Self { address: address.to_owned(), token: token.to_owned(), child }
+    }
+
+    /// The address of its page.
+    pub(crate) fn url(&self) -> String {
+        format!("http://{}/{}/", self.address, self.token)
     }
 
     /// The status and the body of an answer.
@@ -65,7 +70,7 @@ impl View {
     }
 
     /// Interrupts it; its exit code and what it said.
-    fn interrupted(mut self) -> (Option<i32>, String) {
+    pub(crate) fn interrupted(mut self) -> (Option<i32>, String) {
         Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
         let start = Instant::now();
         let status = self.child.wait().unwrap();

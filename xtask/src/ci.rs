@@ -3,6 +3,7 @@
 //! Steps that take a second come first. Tests come last, so that the output ends with the test runner's own lines.
 //! Every step builds with the profile `dev`, so that one step's artifacts serve the next.
 
+use crate::browser::{self, PAGE};
 use crate::repo::{Outcome, Repo};
 use crate::toml_lines::lines;
 use crate::vulkan::TESTS;
@@ -75,7 +76,7 @@ fn perform(work: &Work, repo: &Repo) -> Result<(), String> {
 }
 
 /// Output goes straight to the terminal: nothing is swallowed, and a failure is the last thing shown.
-fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<(), String> {
+pub(crate) fn cargo(words: &[String], environment: &[(&str, &str)], repo: &Repo) -> Result<(), String> {
     let line = format!("cargo {}", words.join(" "));
     println!("$ {line}");
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -115,12 +116,12 @@ pub(crate) fn clippy() -> String {
 const PACKAGES: &str = "publish --workspace --dry-run --allow-dirty";
 
 /// What takes minutes and rarely breaks where [`run`] holds, to be run before a release: kernels
-/// compiled anew, where tests hold the hashes of what they were compiled from; each crate by itself, with none of its features
+/// compiled anew, where tests hold the hashes of what they were compiled from; the page in a browser; each crate by itself, with none of its features
 /// and with each of them; recordings by every executor under every validation; every scene drawn, forms
 /// that take long, every bit of small files flipped, every package built by itself, and a minute of each target of fuzzing.
 pub(crate) fn deep(repo: &Repo) -> Outcome {
     // Of the whole workspace, so that what other steps have compiled serves this one.
-    let slow = format!("{TESTS} --features {FEATURES},{DRIVER} --test tests --test end-to-end -- {DEEP}");
+    let slow = format!("{TESTS} --features {FEATURES},{DRIVER} --test tests --test end-to-end -- {DEEP} --skip {PAGE}");
     let damage = format!("{TESTS} --features {FEATURES},{DRIVER} --test bad_inputs_damage");
     let strict = |words: Vec<String>| [words, split("-- -D warnings")].concat();
     let alone = bare(repo).into_iter().map(|check| check.1).chain(with_one_feature(repo)).map(strict).collect();
@@ -129,6 +130,7 @@ pub(crate) fn deep(repo: &Repo) -> Outcome {
         Step { name: "alone", work: Work::Cargo(alone, &[]) },
         Step { name: "vulkan", work: Work::Task(vulkan::run) },
         Step { name: "deep tests", work: Work::Cargo(vec![split(&slow)], &[]) },
+        Step { name: "browser", work: Work::Task(browser::run) },
         Step { name: "damage", work: Work::Cargo(vec![split(&damage)], &[("ORGANZA_DEEP", "1")]) },
         Step { name: "packages", work: Work::Cargo(vec![split(PACKAGES)], &[]) },
         Step { name: "python", work: Work::Task(python::run) },

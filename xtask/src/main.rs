@@ -1,7 +1,9 @@
 //! The tasks of the repository: `cargo xtask help` lists them.
 
 mod assets;
+mod browser;
 mod ci;
+mod debian;
 mod deny;
 mod effects;
 mod fuzz;
@@ -44,6 +46,7 @@ usage: cargo xtask COMMAND
   shaders          compiles shaders/glsl to shaders/spirv and writes the manifest; builds glslang first (C++, minutes)
   shaders --check  fails where the committed modules are not what their sources compile to
   vulkan           runs every kernel and recording on Mesa's lavapipe under validation; installs it as root with apt
+  browser          the page of `organza view` in Chromium; installs it as root with apt
   help             this text
 ";
 
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
         ["assets", "solids"] => Repo::open().and_then(|repo| assets::write_solids(&repo)),
         ["shaders"] => Repo::open().and_then(|repo| shaders::run(&repo, false)),
         ["shaders", "--check"] => Repo::open().and_then(|repo| shaders::run(&repo, true)),
+        ["browser"] => Repo::open().and_then(|repo| browser::run(&repo)),
         ["vulkan"] => Repo::open().and_then(|repo| vulkan::run(&repo)),
         [] | ["help" | "--help" | "-h"] => {
             print!("{HELP}");

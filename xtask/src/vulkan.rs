@@ -4,6 +4,7 @@
 //! about speed. What is missing is installed where that is possible (root, apt), printed where it is not.
 
 use crate::ci::{DEEP, DRIVER, FEATURES};
+use crate::debian;
 use crate::repo::{Outcome, Repo};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -41,7 +42,7 @@ const WITH_TESTS: [&str; 2] = ["ash", "synchronization"];
 pub(crate) fn run(repo: &Repo) -> Outcome {
     let parts = match parts()? {
         Ok(parts) => parts,
-        Err(missing) => return without("vulkan", &missing),
+        Err(missing) => return debian::without("vulkan", &PACKAGES, &missing),
     };
     let modules = check_modules(repo, &parts.spirv_val)?;
     for by in [WITH_TESTS, ["wgpu", "synchronization"], ["ash", "gpu-assisted"]] {
@@ -57,7 +58,9 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
 pub(crate) fn tests(repo: &Repo) -> Outcome {
     let (line, said, parts) = match parts()? {
         Ok(parts) => (format!("{TESTS} --features {FEATURES},{DRIVER}"), "tests: all".to_owned(), Some(parts)),
-        Err(missing) => (format!("{TESTS} --features {FEATURES}"), without("conformance tests", &missing)?, None),
+        Err(missing) => {
+            (format!("{TESTS} --features {FEATURES}"), debian::without("conformance tests", &PACKAGES, &missing)?, None)
+        }
     };
     // Clippy has compiled the examples, which no test runs.
     for targets in [format!("--tests -- --skip {DEEP}"), "--doc".to_owned()] {
@@ -71,17 +74,16 @@ pub(crate) fn tests(repo: &Repo) -> Outcome {
 pub(crate) fn modules(repo: &Repo) -> Outcome {
     match parts()? {
         Ok(parts) => Ok(format!("vulkan: {} modules valid", check_modules(repo, &parts.spirv_val)?)),
-        Err(missing) => without("vulkan", &missing),
+        Err(missing) => debian::without("vulkan", &PACKAGES, &missing),
     }
 }
 
 /// The parts, installed where that is possible, or the names of what is missing.
 fn parts() -> Result<Result<Parts, String>, String> {
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
+    let folders = debian::folders();
     let look = || find(&ROOTS.map(PathBuf::from), &folders);
     let found = match look() {
-        Err(missing) if install(&folders, &missing)? => Ok(look()?),
+        Err(missing) if debian::install(&folders, &PACKAGES, &missing) => Ok(look()?),
         found => found,
     };
     if let Ok(parts) = &found {
@@ -103,7 +105,7 @@ fn find(roots: &[PathBuf], folders: &[PathBuf]) -> Result<Parts, String> {
     };
     let driver = announced("icd.d", "lvp_icd");
     let layer = announced("explicit_layer.d", "VkLayer_khronos_validation");
-    let spirv_val = on_path(folders, "spirv-val");
+    let spirv_val = debian::on_path(folders, "spirv-val");
     match (driver, layer, spirv_val) {
         (Some(driver), Some(layer), Some(spirv_val)) => Ok(Parts { driver, layer, spirv_val }),
         (driver, layer, spirv_val) => {
@@ -115,41 +117,6 @@ fn find(roots: &[PathBuf], folders: &[PathBuf]) -> Result<Parts, String> {
             Err(missing.into_iter().flatten().collect::<Vec<_>>().join(", "))
         }
     }
-}
-
-fn on_path(folders: &[PathBuf], program: &str) -> Option<PathBuf> {
-    folders.iter().map(|folder| folder.join(program)).find(|file| file.is_file())
-}
-
-/// Installs the packages where that needs no question: as root, with apt. Says whether it did.
-fn install(folders: &[PathBuf], missing: &str) -> Result<bool, String> {
-    let root = Command::new("id").arg("-u").output().is_ok_and(|o| o.stdout.trim_ascii() == b"0");
-    let Some(apt) = on_path(folders, "apt-get").filter(|_| root) else { return Ok(false) };
-    println!("missing: {missing}\n$ {}", command());
-    let steps: [&[&str]; 2] = [&["update", "-qq"], &["install", "-qq", "-y", "--no-install-recommends"]];
-    for (step, packages) in steps.into_iter().zip([&[][..], &PACKAGES]) {
-        let mut command = Command::new(&apt);
-        let ran = command.args(step).args(packages).env("DEBIAN_FRONTEND", "noninteractive").status();
-        if !ran.is_ok_and(|status| status.success()) {
-            eprintln!("apt-get {} failed", step[0]);
-            return Ok(false);
-        }
-    }
-    Ok(true)
-}
-
-fn command() -> String {
-    format!("apt-get update && apt-get install -y --no-install-recommends {}", PACKAGES.join(" "))
-}
-
-/// Without the parts nothing is tested: said by name, and no success where everything must be.
-fn without(what: &str, missing: &str) -> Outcome {
-    refuse_or_skip(what, missing, std::env::var("CI").as_deref() == Ok("true"))
-}
-
-fn refuse_or_skip(what: &str, missing: &str, ci: bool) -> Outcome {
-    let said = format!("missing: {missing}; install with `{}`", command());
-    if ci { Err(said) } else { Ok(format!("{what}: SKIPPED, {said}")) }
 }
 
 fn check_modules(repo: &Repo, spirv_val: &Path) -> Result<usize, String> {
@@ -208,13 +175,6 @@ mod tests {
     fn what_is_missing_is_named() {
         let missing = find(&["no/such/root".into()], &["no/such/folder".into()]);
         assert_eq!(missing, Err("lavapipe, the validation layer, spirv-val".to_owned()));
-    }
-
-    #[test]
-    fn a_missing_part_is_a_failure_only_where_everything_must_run() {
-        let said = refuse_or_skip("vulkan", "lavapipe", false).expect("a skip is no failure");
-        assert!(said.starts_with("vulkan: SKIPPED, missing: lavapipe; install with `apt-get update"), "{said}");
-        assert!(refuse_or_skip("vulkan", "lavapipe", true).is_err());
     }
 
     #[test]

@@ -118,7 +118,7 @@ async function compare(row, key) {
   const name = keptText(row);
   try {
     const answer = await fetch(`comparison?client=${client}`);
-    if (answer.ok) {
+    if (answer.status === 200) {
       const found = await answer.json();
       compared = key;
       const isCompared = found.rmse !== null;
@@ -142,7 +142,7 @@ async function compare(row, key) {
 async function showOver(what) {
   try {
     const answer = await fetch(`${what}?client=${client}&of=${compared || kept}`);
-    if (!answer.ok) return;
+    if (answer.status !== 200) return;
     const image = await createImageBitmap(await answer.blob());
     keptCanvas.width = image.width;
     keptCanvas.height = image.height;
@@ -216,7 +216,7 @@ function lookBelow(place, isSaid) {
 async function lookOnce(place, isSaid) {
   try {
     const answer = await fetch(`below?client=${client}&right=${place.right.toFixed(6)}&down=${place.down.toFixed(6)}`);
-    const text = answer.ok ? belowText(await answer.json()) : "Values of this view are not known yet";
+    const text = answer.status === 200 ? belowText(await answer.json()) : "Values of this view are not known yet";
     at("below-text").textContent = text;
     if (isSaid) at("below-said").textContent = text;
   } catch {

@@ -97,9 +97,9 @@ function sentence(error) {
   return error.hint ? `${error.message}. ${error.hint.charAt(0).toUpperCase()}${error.hint.slice(1)}.` : error.message;
 }
 
-let problem = "";
-function trouble(text) {
-  problem = text;
+let isOfPicture = false;
+function trouble(text, isFailure = false) {
+  isOfPicture = isFailure;
   at("trouble").textContent = text;
   at("trouble").hidden = text === "";
 }
@@ -109,13 +109,13 @@ let number = 0;
 let generation = 0;
 async function takePicture(answer) {
   if (answer.status !== 200) return;
-  number = Number(answer.headers.get("organza-number"));
-  generation = Number(answer.headers.get("organza-generation"));
   const image = await createImageBitmap(await answer.blob());
   canvas.width = image.width;
   canvas.height = image.height;
   pen.drawImage(image, 0, 0);
   image.close();
+  number = Number(answer.headers.get("organza-number"));
+  generation = Number(answer.headers.get("organza-generation"));
   at("waiting").hidden = true;
   if (shown) showMark(shown);
   placeDivider();
@@ -179,8 +179,10 @@ function showStatus(found) {
   at("where").textContent = `azimuth ${eye.azimuth.toFixed(0)}°, elevation ${eye.elevation.toFixed(0)}°`;
   canvas.setAttribute("aria-label", `${found.title} from azimuth ${eye.azimuth.toFixed(0)}, elevation ${eye.elevation.toFixed(0)} degrees`);
   if (found.failure) {
-    trouble(sentence(found.failure));
+    trouble(sentence(found.failure), true);
     if (!picture) at("waiting").textContent = "";
+  } else if (isOfPicture) {
+    trouble("");
   }
   showWarnings(picture && picture.level === "whole" ? picture.warnings : null);
 }

@@ -214,18 +214,16 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         }
         Route::Kept => {
             let kept = counter.session.kept_picture();
-            let refused = || Refusal::new(StatusCode::NOT_FOUND, "no picture is kept");
-            Ok(of_type("image/png", kept.ok_or_else(refused)?.png.clone()))
+            Ok(kept.map_or_else(nothing, |kept| of_type("image/png", kept.png.clone())))
         }
         Route::Comparison => {
             let found = comparison(&counter.session).await?;
-            Ok(of_type("application/json", json_of(&*found)?))
+            found.map_or_else(|| Ok(nothing()), |found| Ok(of_type("application/json", json_of(&*found)?)))
         }
         Route::Difference => {
             let found = comparison(&counter.session).await?;
-            let refused = || Refusal::new(StatusCode::NOT_FOUND, "the two pictures are not compared");
-            let png = Some(found.png.clone()).filter(|png| !png.is_empty());
-            Ok(of_type("image/png", png.ok_or_else(refused)?))
+            let png = found.map(|found| found.png.clone()).filter(|png| !png.is_empty());
+            Ok(png.map_or_else(nothing, |png| of_type("image/png", png)))
         }
         Route::Save(what) => saved(&counter.session, what).await,
         Route::Page | Route::Script(_) | Route::Style | Route::Leave => {
@@ -335,6 +333,13 @@ fn shown(session: &Session) -> Result<Vec<u8>, Refusal> {
     json_of(&session.shown())
 }
 
+/// No news, and no fault.
+fn nothing() -> Answer {
+    let mut answer = Response::new(Full::default());
+    *answer.status_mut() = StatusCode::NO_CONTENT;
+    answer
+}
+
 /// What lies below a place of the picture.
 async fn below(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Refusal> {
     let session = Arc::clone(session);
@@ -342,18 +347,17 @@ async fn below(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Re
     let found = tokio::task::spawn_blocking(move || session.below(place)).await;
     let found =
         found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "looking below the pointer failed"))?;
-    let refused = || Refusal::new(StatusCode::NOT_FOUND, "depths of this view are not known yet");
-    Ok(of_type("application/json", json_of(&found.ok_or_else(refused)?)?))
+    // Depths of this view come with its coarse picture.
+    found.map_or_else(|| Ok(nothing()), |found| Ok(of_type("application/json", json_of(&found)?)))
 }
 
-/// How the present picture differs from the one that was kept.
-async fn comparison(session: &Arc<Session>) -> Result<Arc<Comparison>, Refusal> {
+/// How the present picture differs from the one that was kept; nothing before there are both.
+async fn comparison(session: &Arc<Session>) -> Result<Option<Arc<Comparison>>, Refusal> {
     let session = Arc::clone(session);
     // What the eye makes of two pictures takes a while.
     let found = tokio::task::spawn_blocking(move || session.comparison()).await;
     let found = found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "comparing two pictures failed"))?;
-    let refused = || Refusal::new(StatusCode::NOT_FOUND, "no picture is kept, or the present one is not drawn yet");
-    found.map_err(|e| Refusal::of_error(&e))?.ok_or_else(refused)
+    found.map_err(|e| Refusal::of_error(&e))
 }
 
 fn json_of(document: &impl Serialize) -> Result<Vec<u8>, Refusal> {
@@ -371,9 +375,7 @@ async fn picture(session: &Session, after: u64) -> Result<Answer, Refusal> {
     };
     let _ = timeout(PATIENCE, newer).await;
     let Some(picture) = session.picture().filter(|picture| picture.facts.number > after) else {
-        let mut answer = Response::new(Full::default());
-        *answer.status_mut() = StatusCode::NO_CONTENT;
-        return Ok(answer);
+        return Ok(nothing());
     };
     let mut answer = of_type("image/png", picture.png.clone());
     for (name, number) in [("organza-number", picture.facts.number), ("organza-generation", picture.facts.generation)] {

@@ -1,0 +1,177 @@
+//! The page of `organza view` in Chromium: `cargo xtask browser`.
+
+use super::chromium::Page;
+use crate::view::{FOG, View};
+use organza_tests::{Place, SMALL_SCENE};
+use std::time::{Duration, Instant};
+
+/// A whole picture of what the page has asked for last.
+const WHOLE: &str =
+    "!isSending && waiting.length === 0 && shown.is_whole && generation === shown.generation && at('coarse').hidden";
+/// The bits of the picture on the page.
+const PICTURE: &str = "canvas.toDataURL()";
+
+/// A scene with a volume whose values rise along x.
+fn volume(place: &Place) -> String {
+    let mut file =
+        b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 8 8 8\nencoding: raw\nspacings: 0.2 0.2 0.2\n\n".to_vec();
+    file.extend((0..512).map(|n| (n % 8 * 30) as u8));
+    place.write("ramp.nrrd", file);
+    let transfer = "[{ value = 0, color = [1, 0.5, 0.2], extinction = 0 }, { value = 210, color = [0.2, 0.5, 1], extinction = 3 }]";
+    format!("{SMALL_SCENE}[[object]]\nname = \"ramp\"\nvolume = \"ramp.nrrd\"\ntransfer = {transfer}\n")
+}
+
+fn opened(view: &View) -> Page {
+    let mut page = Page::open(&view.url(), 1280, 720);
+    page.wait_for(WHOLE);
+    page
+}
+
+#[track_caller]
+fn ends_well(page: &Page, view: View) {
+    assert!(page.faults.is_empty(), "{:?}", page.faults);
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
+fn a_drag_turns_an_effect_goes_and_comes_back_and_the_file_is_that_of_render() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let first = page.value(PICTURE);
+    let saved = "fetch(`save/picture.png?client=${client}`).then((answer) => answer.arrayBuffer()).then((bytes) => [...new Uint8Array(bytes)])";
+    let bytes: Vec<u8> = serde_json::from_value(page.value(saved)).unwrap();
+    place.expect(0, &["render", "s.toml", "-o", "render.png"], "");
+    assert!(bytes == place.bytes("render.png"));
+    page.mouse("mousePressed", 300.0, 300.0);
+    for step in 1..=8 {
+        page.mouse("mouseMoved", 300.0 + 10.0 * f64::from(step), 300.0);
+    }
+    page.mouse("mouseReleased", 380.0, 300.0);
+    page.wait_for("Math.abs(shown.viewpoint.azimuth) > 5");
+    page.wait_for(WHOLE);
+    let turned = page.value(PICTURE);
+    assert_ne!(turned, first);
+    let switch = |way: &str| format!("rows.effects.get('object.fog').inputs.{way}.click()");
+    page.value(&switch("off"));
+    page.wait_for("!shown.objects.find((object) => object.name === 'fog').visible");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), turned);
+    page.value(&switch("auto"));
+    page.wait_for("shown.objects.find((object) => object.name === 'fog').visible");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), turned);
+    page.press("r");
+    page.wait_for("Math.abs(shown.viewpoint.azimuth) < 1");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), first);
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_cut_is_added_dragged_in_the_picture_and_removed() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let first = page.value(PICTURE);
+    page.value("at('cuts-panel').open = true, at('add-cut').click()");
+    page.wait_for("shown.cuts.length === 1");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), first);
+    let before = page.value("shown.cuts[0].point[2]").as_f64().unwrap();
+    let handle = page.value("(() => { const box = at('plane-handle').getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2]; })()");
+    let (x, y) = (handle[0].as_f64().unwrap(), handle[1].as_f64().unwrap());
+    page.mouse("mousePressed", x, y);
+    page.mouse("mouseMoved", x, y - 20.0);
+    page.mouse("mouseMoved", x, y - 40.0);
+    page.mouse("mouseReleased", x, y - 40.0);
+    // A plane across the view goes away from the eye as its handle is dragged upwards.
+    page.wait_for(&format!("shown.cuts[0].point[2] < {before} - 0.05"));
+    assert_eq!(page.value("Math.abs(shown.viewpoint.azimuth) < 0.5"), true, "the scene stays");
+    page.value("cutRows[0].item.querySelectorAll('button')[1].click()");
+    page.wait_for("shown.cuts.length === 0");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), first);
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_knot_is_moved_by_keys_and_pictures_are_compared() {
+    let place = Place::new(SMALL_SCENE);
+    let scene = volume(&place);
+    place.write("s.toml", scene);
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let first = page.value(PICTURE);
+    page.value("at('compare-panel').open = true, at('keep').click()");
+    page.wait_for("shown.kept");
+    page.value("rows.objects.get('ramp').curve.canvas.focus()");
+    page.press("PageUp");
+    for _ in 0..5 {
+        page.press("ArrowDown");
+    }
+    page.wait_for("shown.objects.find((object) => object.name === 'ramp').curve.knots[1].extinction < 2.9");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), first);
+    page.wait_for(
+        "/RMSE/.test(at('compare-text').textContent) && !/RMSE 0\\b(?!\\.)/.test(at('compare-text').textContent)",
+    );
+    page.value("rows.objects.get('ramp').curve.take(null)");
+    page.wait_for(WHOLE);
+    page.wait_for(&format!("{PICTURE} === {first}"));
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_broken_scene_is_told_and_a_mended_one_is_drawn() {
+    let place = Place::new(SMALL_SCENE);
+    let view = View::start(&place, &["s.toml", "--watch"]);
+    let mut page = opened(&view);
+    let first = page.value(PICTURE);
+    place.write("s.toml", format!("{SMALL_SCENE}opacty = 2\n"));
+    page.wait_for("!at('trouble').hidden && at('trouble').textContent.includes('opacty')");
+    assert_eq!(page.value(PICTURE), first, "the last picture stays");
+    place.write("s.toml", format!("{SMALL_SCENE}{FOG}"));
+    page.wait_for("shown.objects.length > 1 && at('trouble').hidden");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), first);
+    ends_well(&page, view);
+}
+
+#[test]
+fn the_page_fits_a_screen_and_a_phone_and_is_used_by_keys() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    for (width, height) in [(1280, 720), (390, 844)] {
+        let size =
+            serde_json::json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 760 });
+        page.call("Emulation.setDeviceMetricsOverride", size);
+        page.value("for (const panel of document.querySelectorAll('details')) panel.open = true");
+        assert_eq!(page.value("document.documentElement.scrollWidth <= innerWidth"), true, "{width}");
+        // What can be used has a name.
+        let nameless = "[...document.querySelectorAll('button, input, select')].filter((control) => control.offsetParent \
+                        && !control.labels?.length && !control.getAttribute('aria-label') && !control.textContent.trim()).map((control) => control.outerHTML)";
+        assert_eq!(page.value(nameless), serde_json::json!([]), "{width}");
+    }
+    page.value("stage.focus()");
+    page.press("ArrowRight");
+    page.wait_for("Math.abs(shown.viewpoint.azimuth) > 2");
+    page.press("h");
+    page.wait_for("at('keys').open");
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_view_ends_after_its_page_was_closed_while_it_draws() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let mut view = View::start(&place, &["s.toml", "--size", "4000x3000"]);
+    let mut page = Page::open(&view.url(), 1280, 720);
+    page.wait_for("shown && shown.drawing");
+    page.call("Page.navigate", serde_json::json!({ "url": "about:blank" }));
+    let end = Instant::now() + Duration::from_secs(40);
+    while view.child.try_wait().unwrap().is_none() {
+        assert!(Instant::now() < end, "it goes on");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
