@@ -266,6 +266,9 @@ impl Artist {
         let files = self.coarse.files();
         for object in scene.objects.iter().filter(|object| object.visible) {
             let frame = if let Source::Volume(volume) = &object.source { volume.frame } else { 0 };
+            if let (Source::Mesh(path) | Source::Points(path), None) = (&object.source, &object.labels) {
+                desk.keep_columns(&object.name, files.columns(scene, path, frame));
+            }
             let data = object.source.path().and_then(|path| files.kept(scene, path, frame));
             if let Some(data) = data.as_ref().and_then(DataOfObject::new) {
                 desk.keep_data(&object.name, data);

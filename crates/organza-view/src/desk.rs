@@ -100,6 +100,8 @@ struct Papers {
     curves: BTreeMap<String, Values>,
     /// A box around all that was drawn, world units.
     bounds: Option<DAabb>,
+    /// Names of columns that objects can be coloured by, by the objects' names.
+    columns: BTreeMap<String, Vec<String>>,
     /// What objects are made of, by their names.
     data: BTreeMap<String, DataOfObject>,
     /// Settings from fast to exact; `None` before a page asks for them.
@@ -134,6 +136,8 @@ pub(crate) struct Seen {
     pub(crate) curves: BTreeMap<String, Values>,
     /// A box around all that was drawn, world units.
     pub(crate) bounds: Option<DAabb>,
+    /// Names of columns that objects can be coloured by, by the objects' names.
+    pub(crate) columns: BTreeMap<String, Vec<String>>,
     /// Settings from fast to exact; `None` before a page asks for them.
     pub(crate) rungs: Option<Vec<RungRow>>,
 }
@@ -151,6 +155,7 @@ impl Desk {
             depths: None,
             curves: BTreeMap::new(),
             bounds: None,
+            columns: BTreeMap::new(),
             data: BTreeMap::new(),
             rungs: None,
             is_asked: false,
@@ -204,6 +209,7 @@ impl Desk {
             effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
             curves: papers.curves.clone(),
             bounds: papers.bounds,
+            columns: papers.columns.clone(),
             rungs: papers.rungs.clone(),
         }
     }
@@ -289,6 +295,15 @@ impl Desk {
         self.tell(papers);
     }
 
+    /// Keeps the names of columns that an object can be coloured by.
+    pub(crate) fn keep_columns(&self, object: &str, columns: Vec<String>) {
+        let mut papers = self.papers();
+        if papers.columns.get(object) != Some(&columns) {
+            papers.columns.insert(object.to_owned(), columns);
+            self.tell(papers);
+        }
+    }
+
     /// Keeps a box around what was drawn, beside what was drawn before: a cut leaves less, and may go back.
     pub(crate) fn keep_bounds(&self, bounds: DAabb) {
         let mut papers = self.papers();
@@ -332,8 +347,9 @@ impl Desk {
 
     /// Forgets what is known of data.
     pub(crate) fn forget_values(&self) {
-        self.papers().bounds = None;
         let mut papers = self.papers();
+        papers.bounds = None;
+        papers.columns.clear();
         papers.curves.clear();
         papers.data.clear();
     }

@@ -120,6 +120,22 @@ pub enum Event {
         /// Linear colour, each channel ≥ 0; `None` for what the scene says.
         color: Option<[f64; 3]>,
     },
+    /// Colours points or a mesh by a column of its file.
+    ColorBy {
+        /// Name of the object.
+        object: String,
+        /// Name of the column; `None` for what the scene says.
+        column: Option<String>,
+        /// Name of the map, such as `viridis`; `None` for the one that suits the column.
+        map: Option<String>,
+    },
+    /// Draws an object by a technique of its own.
+    ObjectTechnique {
+        /// Name of the object.
+        object: String,
+        /// As scenes name it, such as `particles`; `None` for what the scene says.
+        technique: Option<String>,
+    },
     /// Cuts objects open: all cuts of the view, in the place of those before.
     Cuts {
         /// The planes, [`MOST_CUTS`] at most. Cuts of the scene itself stay.
@@ -251,7 +267,7 @@ impl Event {
             }
             Self::Transfer { knots: None, .. } | Self::Color { color: None, .. } => Ok(()),
             Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
-            Self::Technique { .. } => Ok(()),
+            Self::Technique { .. } | Self::ColorBy { .. } | Self::ObjectTechnique { .. } => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
         }
@@ -368,6 +384,8 @@ mod tests {
             Event::Color { object: "c".into(), color: None },
             Event::Cuts { cuts: vec![Cut { object: None, normal: [0.0, 1.0, 0.0], point: [0.5, 2.5, -1.0] }] },
             Event::Cuts { cuts: Vec::new() },
+            Event::ColorBy { object: "c".into(), column: Some("U:x".into()), map: None },
+            Event::ObjectTechnique { object: "c".into(), technique: Some("sheets".into()) },
             Event::Layer { layer: Some("normal".into()) },
             Event::Accuracy { step: -2, set: vec!["render.antialias=1".into(), "render.points.exact=false".into()] },
             Event::Technique { technique: Some("sheets".into()) },

@@ -174,6 +174,14 @@ pub struct ObjectRow {
     pub color: Option<[f64; 3]>,
     /// Whether that is the view's.
     pub is_recolored: bool,
+    /// Names of columns of its file that it can be coloured by.
+    pub columns: Vec<String>,
+    /// The column that was chosen; `None` for what the scene says.
+    pub color_by: Option<String>,
+    /// The map that was chosen for that.
+    pub map: Option<String>,
+    /// The technique that was chosen for it alone.
+    pub technique: Option<String>,
     /// Whether it can have a colour of its own: a volume and a slice have those of their values.
     pub takes_color: bool,
     /// The transfer function of a volume.
@@ -381,7 +389,8 @@ impl Session {
     /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, rungs } = self.desk.seen();
+        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, columns, rungs } =
+            self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         let row = |(rank, object): (usize, &SceneObject)| ObjectRow {
             name: object.name.clone(),
@@ -389,6 +398,10 @@ impl Session {
             visible: object.visible,
             opacity: (!object.source.is_medium()).then(|| studio.scene.opacity_of(object)),
             color: object.color.map(|color| color.map(number)),
+            columns: columns.get(&object.name).cloned().unwrap_or_default(),
+            color_by: studio.state.color_by_of(rank).map(|by| by.column.clone()),
+            map: studio.state.color_by_of(rank).and_then(|by| by.map.clone()),
+            technique: studio.state.technique_of(rank).map(str::to_owned),
             is_recolored: studio.state.is_recolored(rank),
             takes_color: takes_color(object),
             curve: CurveRow::of_object(object, curves.get(&object.name)),

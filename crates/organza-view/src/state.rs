@@ -97,7 +97,16 @@ struct ObjectChange {
     visible: Option<bool>,
     opacity: Option<f64>,
     color: Option<[f64; 3]>,
+    color_by: Option<ColorBy>,
     knots: Option<Vec<Knot>>,
+    technique: Option<String>,
+}
+
+/// A column that an object is coloured by, and the map.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ColorBy {
+    pub(crate) column: String,
+    pub(crate) map: Option<String>,
 }
 
 /// A position between fast and exact, and the settings that it stands for.
@@ -142,6 +151,16 @@ impl State {
     /// The planes that cut objects open, beside those of the scene.
     pub(crate) fn cuts(&self) -> &[Cut] {
         &self.cuts
+    }
+
+    /// The column that an object was chosen to be coloured by.
+    pub(crate) fn color_by_of(&self, object: usize) -> Option<&ColorBy> {
+        self.objects.get(&object)?.color_by.as_ref()
+    }
+
+    /// The technique that was chosen for an object.
+    pub(crate) fn technique_of(&self, object: usize) -> Option<&str> {
+        self.objects.get(&object)?.technique.as_deref()
     }
 
     /// Whether a colour was chosen for an object.
@@ -240,7 +259,23 @@ impl State {
                 }
                 self.change(scene, object)?.knots.clone_from(knots);
             }
-            Event::Color { object, color } => self.change(scene, object)?.color = *color,
+            Event::Color { object, color } => {
+                let change = self.change(scene, object)?;
+                change.color = *color;
+                // A scene has one of the two.
+                change.color_by = change.color_by.take().filter(|_| color.is_none());
+            }
+            Event::ColorBy { object, column, map } => {
+                let color_by = column.clone().map(|column| ColorBy { column, map: map.clone() });
+                let change = self.change(scene, object)?;
+                change.color = change.color.filter(|_| color_by.is_none());
+                change.color_by = color_by;
+            }
+            Event::ObjectTechnique { object, technique } => {
+                self.change(scene, object)?.technique.clone_from(technique);
+                // Another technique has other settings.
+                self.accuracy = Accuracy::default();
+            }
             Event::Cuts { cuts } => {
                 cuts.iter()
                     .filter_map(|cut| cut.object.as_ref())
@@ -299,8 +334,20 @@ impl State {
             if let Some(opacity) = change.opacity {
                 changes.push(Override::parse(&format!("object.{key}.opacity={opacity:?}"))?);
             }
+            let stated = scene.objects.get(*rank);
+            if change.color.is_some() && stated.is_some_and(|object| object.points.color_by.is_some()) {
+                changes.push(Override::parse(&format!("object.{key}.color_by="))?);
+            }
+            if change.color_by.is_some() && stated.is_some_and(|object| object.color.is_some()) {
+                changes.push(Override::parse(&format!("object.{key}.color="))?);
+            }
             if let Some(color) = &change.color {
                 changes.push(Override::parse(&format!("object.{key}.color={color:?}"))?);
+            }
+            if let Some(ColorBy { column, map }) = &change.color_by {
+                let text = |name: &String| toml_edit::Value::from(name.as_str()).to_string();
+                let map = map.as_ref().map_or_else(String::new, |map| format!(", map = {}", text(map)));
+                changes.push(Override::parse(&format!("object.{key}.color_by={{ column = {}{map} }}", text(column)))?);
             }
             if let Some(knots) = &change.knots {
                 changes.push(Override::parse(&format!("object.{key}.transfer={}", transfer(knots)))?);
@@ -336,8 +383,12 @@ impl State {
         }
         if let Some(technique) = &self.technique {
             changes.push(Override::parse(&format!("render.technique={technique:?}"))?);
-            // Objects that name one of their own would stay as they are.
-            for (rank, _) in scene.objects.iter().enumerate().filter(|(_, object)| object.technique.is_some()) {
+        }
+        for (rank, object) in scene.objects.iter().enumerate() {
+            let own = self.objects.get(&rank).and_then(|change| change.technique.as_ref());
+            // Objects that name one of their own in the scene would stay as they are.
+            let of_scene = self.technique.as_ref().filter(|_| object.technique.is_some());
+            if let Some(technique) = own.or(of_scene) {
                 let key = key_of(scene, rank);
                 changes.push(Override::parse(&format!("object.{key}.technique={technique:?}"))?);
             }
@@ -586,6 +637,54 @@ mod tests {
         let color = |color| Event::Color { object: "pane".into(), color };
         assert_eq!(after(&[color(Some([0.25, 0.5, 1.0]))]).unwrap().objects[0].color, Some([0.25, 0.5, 1.0]));
         assert_eq!(after(&[color(Some([0.25, 0.5, 1.0])), color(None)]).unwrap(), after(&[]).unwrap());
+    }
+
+    #[test]
+    fn an_object_has_a_colour_or_a_column_whichever_came_last() {
+        let text = "version = 1\ncamera = \"auto\"\n\
+            [[object]]\nname = \"a\"\nmesh = \"a.ply\"\ncolor = [1, 0, 0]\n\
+            [[object]]\nname = \"b\"\nmesh = \"a.ply\"\ncolor_by = { column = \"height\" }\n";
+        let Opening { file, text, load, .. } = Opening::of_text("a.toml", text, RenderOptions::default());
+        let source = Source { file, text, load };
+        let scene = source.scene(Vec::new()).unwrap();
+        let changed = |events: &[Event]| {
+            let mut state = State::default();
+            let first = Viewpoint::of_scene(&after(&[]).unwrap());
+            events.iter().for_each(|event| state.apply(event, &scene, &first).unwrap());
+            source.scene(source.overrides(&state, &scene).unwrap()).unwrap()
+        };
+        let color = |object: &str, color| Event::Color { object: object.into(), color };
+        let column = |object: &str, column: Option<&str>| Event::ColorBy {
+            object: object.into(),
+            column: column.map(str::to_owned),
+            map: Some("turbo".into()),
+        };
+        let columns = |scene: &Scene| {
+            let name = |object: &scene::SceneObject| Some(object.points.color_by.as_ref()?.column.clone());
+            scene.objects.iter().map(name).collect::<Vec<_>>()
+        };
+        let by_column = changed(&[column("a", Some("U \"1\":x")), color("b", Some([0.0, 1.0, 0.5]))]);
+        assert_eq!(columns(&by_column), [Some("U \"1\":x".to_owned()), None]);
+        assert_eq!((by_column.objects[0].color, by_column.objects[1].color), (None, Some([0.0, 1.0, 0.5])));
+        let last = changed(&[column("a", Some("x")), color("a", Some([0.5; 3]))]);
+        assert_eq!((columns(&last)[0].clone(), last.objects[0].color), (None, Some([0.5; 3])));
+        let last = changed(&[color("b", Some([0.5; 3])), column("b", Some("x"))]);
+        assert_eq!((columns(&last)[1].clone(), last.objects[1].color), (Some("x".to_owned()), None));
+        assert_eq!(changed(&[column("a", Some("x")), column("a", None)]), scene);
+    }
+
+    #[test]
+    fn a_technique_of_one_object_stands_before_that_of_all() {
+        let of_all = Event::Technique { technique: Some("points".into()) };
+        let own = |technique: Option<&str>| Event::ObjectTechnique {
+            object: "fog".into(),
+            technique: technique.map(str::to_owned),
+        };
+        let scene = after(&[own(Some("sheets")), of_all.clone()]).unwrap();
+        assert_eq!(scene.render.technique, scene::Technique::Points);
+        assert_eq!(scene.objects[2].technique, Some(scene::Technique::Sheets));
+        assert_eq!(after(&[own(Some("sheets")), own(None)]).unwrap(), after(&[]).unwrap());
+        assert!(after(&[own(Some("paint"))]).is_err());
     }
 
     #[test]

@@ -123,6 +123,44 @@ fn a_knot_is_moved_by_keys_and_pictures_are_compared() {
 }
 
 #[test]
+fn points_are_coloured_by_a_column_and_drawn_by_another_technique() {
+    let place = Place::new(SMALL_SCENE);
+    place.write(
+        "cloud.csv",
+        (0..400).fold("x,y,z,heat\n".to_owned(), |text, n| {
+            text + &format!("{},{},{},{}\n", n % 20, n / 20, 0.1 * f64::from(n % 7), n % 20)
+        }),
+    );
+    let view = View::start(&place, &["cloud.csv", "--size", "160x120"]);
+    let mut page = opened(&view);
+    let first = page.value(PICTURE);
+    page.wait_for("rows.objects.get('cloud').column.options.length > 2");
+    let choose = |what: &str, value: &str| {
+        format!(
+            "(({what}) => {{ {what}.value = '{value}'; {what}.dispatchEvent(new Event('change')); }})(rows.objects.get('cloud').{what})"
+        )
+    };
+    page.value(&choose("column", "heat"));
+    page.wait_for("shown.objects[0].color_by === 'heat' && !at('legends').hidden");
+    page.wait_for(WHOLE);
+    let heat = page.value(PICTURE);
+    assert_ne!(heat, first);
+    page.value(&choose("map", "turbo"));
+    page.wait_for("shown.objects[0].map === 'turbo'");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), heat);
+    page.value(&choose("technique", "particles"));
+    page.wait_for("shown.objects[0].technique === 'particles' && shown.picture.technique.includes('particles')");
+    page.wait_for(WHOLE);
+    page.value(&choose("technique", ""));
+    page.value(&choose("column", ""));
+    page.wait_for("shown.objects[0].color_by === null && shown.objects[0].technique === null");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), first);
+    ends_well(&page, view);
+}
+
+#[test]
 fn a_broken_scene_is_told_and_a_mended_one_is_drawn() {
     let place = Place::new(SMALL_SCENE);
     let view = View::start(&place, &["s.toml", "--watch"]);

@@ -245,8 +245,28 @@ function showObjects(objects) {
       if (document.activeElement !== row.color) row.color.value = hexOf(object.color || [0.6, 0.6, 0.6]);
       row.uncolored.hidden = !object.is_recolored;
     }
+    showColumns(row, object);
+    if (document.activeElement !== row.technique) row.technique.value = object.technique || "";
     if (row.curve) row.curve.show(object.curve);
   });
+}
+
+/// Columns come with the file.
+function showColumns(row, object) {
+  row.by.hidden = object.columns.length === 0;
+  if (row.columns !== object.columns.join("\n")) {
+    row.columns = object.columns.join("\n");
+    row.column.replaceChildren(element("option", { value: "", textContent: "as in the scene" }), ...object.columns.map((name) => element("option", { value: name, textContent: name })));
+  }
+  if (document.activeElement !== row.column) row.column.value = object.color_by || "";
+  if (document.activeElement !== row.map) row.map.value = object.map || "";
+  row.map.hidden = object.color_by === null;
+}
+
+const MAPS = ["viridis", "magma", "inferno", "plasma", "cividis", "turbo", "grey", "coolwarm", "distinct"];
+
+function choice(label, options) {
+  return element("select", { "aria-label": label }, options.map(([value, textContent]) => element("option", { value, textContent })));
 }
 
 function makeObject(object) {
@@ -275,6 +295,15 @@ function makeObject(object) {
     row.uncolored.addEventListener("click", () => add({ do: "color", object: object.name, color: null }));
     children.push(element("span", { className: "color" }, [element("span", { textContent: "Colour" }), row.color, row.uncolored]));
   }
+  row.column = choice(`Column that colours ${object.name}`, []);
+  row.map = choice(`Map of the colours of ${object.name}`, [["", "map that suits"], ...MAPS.map((map) => [map, map])]);
+  const colorBy = () => add({ do: "color_by", object: object.name, column: row.column.value || null, map: row.map.value || null });
+  row.column.addEventListener("change", colorBy);
+  row.map.addEventListener("change", colorBy);
+  row.by = element("span", { className: "color" }, [element("span", { textContent: "Colour by" }), row.column, row.map]);
+  row.technique = choice(`Technique of ${object.name}`, [["", "as the picture"], ...["points", "particles", "sheets", "surfels", "reference"].map((name) => [name, name])]);
+  row.technique.addEventListener("change", () => add({ do: "object_technique", object: object.name, technique: row.technique.value || null }));
+  children.push(row.by, element("span", { className: "color" }, [element("span", { textContent: "Technique" }), row.technique]));
   if (object.curve) {
     row.curve = new Curve(object.name, (knots) => add({ do: "transfer", object: object.name, knots }));
     children.push(row.curve.panel);
