@@ -143,7 +143,7 @@ impl Artist {
         if desk.wants_rungs() {
             // What was measured of another scene, or from elsewhere, says nothing of this one.
             self.scale = self.scale.take().and_then(|mut scale| scale.forget_unless(&stated).then_some(scale));
-            desk.keep_rungs(self.scale.as_ref().map_or_else(Vec::new, Scale::rows));
+            desk.keep_rungs(self.scale.as_ref().map_or_else(Vec::new, Scale::rows), true);
         }
         let pixels = scene.camera.pixels();
         if pixels > self.accepted {
@@ -209,6 +209,7 @@ impl Artist {
         let options = self.options.clone();
         let progress = desk.begin(generation, Task::Ahead);
         let mut scale = self.scale.take().filter(|scale| scale.is_of(stated));
+        desk.keep_rungs(scale.as_ref().map_or_else(Vec::new, Scale::rows), true);
         if scale.is_none() {
             scale = match Scale::new(stated, self.whole(), &options, &progress) {
                 Err(Error::Cancelled) => return Err(Error::Cancelled),
@@ -218,26 +219,26 @@ impl Artist {
         }
         let Some(mut scale) = scale else {
             desk.end();
-            desk.keep_rungs(Vec::new());
+            desk.keep_rungs(Vec::new(), false);
             return Ok(());
         };
         scale.see(stated);
-        desk.keep_rungs(scale.rows());
+        desk.keep_rungs(scale.rows(), true);
         let mut tried = Vec::new();
         let predicted = loop {
             match scale.predict_next(self.whole(), &options, &progress, &mut tried) {
                 Ok(true) if progress.is_cancelled() => break Err(Error::Cancelled),
-                Ok(true) => {}
+                Ok(true) => desk.keep_rungs(scale.rows(), true),
                 Ok(false) => break Ok(()),
                 Err(error) => break Err(error),
             }
         };
-        desk.keep_rungs(scale.rows());
+        desk.keep_rungs(scale.rows(), false);
         let measured = predicted.and_then(|()| match desk.whole().filter(|whole| whole.generation == generation) {
             Some(drawn) => scale.measure(&request.accuracy, &drawn),
             None => Ok(()),
         });
-        desk.keep_rungs(scale.rows());
+        desk.keep_rungs(scale.rows(), false);
         desk.end();
         self.scale = Some(scale);
         measured

@@ -106,6 +106,8 @@ struct Papers {
     data: BTreeMap<String, DataOfObject>,
     /// Settings from fast to exact; `None` before a page asks for them.
     rungs: Option<Vec<RungRow>>,
+    /// Whether the times of some of them are still to be predicted.
+    is_predicting: bool,
     /// Whether they were asked for since a picture was measured.
     is_asked: bool,
     failure: Option<Failure>,
@@ -140,6 +142,8 @@ pub(crate) struct Seen {
     pub(crate) columns: BTreeMap<String, Vec<String>>,
     /// Settings from fast to exact; `None` before a page asks for them.
     pub(crate) rungs: Option<Vec<RungRow>>,
+    /// Whether the times of some of them are still to be predicted.
+    pub(crate) is_predicting: bool,
 }
 
 impl Desk {
@@ -158,6 +162,7 @@ impl Desk {
             columns: BTreeMap::new(),
             data: BTreeMap::new(),
             rungs: None,
+            is_predicting: false,
             is_asked: false,
             failure: None,
             scene_viewpoint,
@@ -211,6 +216,7 @@ impl Desk {
             bounds: papers.bounds,
             columns: papers.columns.clone(),
             rungs: papers.rungs.clone(),
+            is_predicting: papers.is_predicting,
         }
     }
 
@@ -326,6 +332,7 @@ impl Desk {
         let mut papers = self.papers();
         if papers.rungs.is_none() {
             papers.rungs = Some(Vec::new());
+            papers.is_predicting = true;
             papers.is_asked = true;
             self.tell(papers);
         }
@@ -337,10 +344,11 @@ impl Desk {
     }
 
     /// Keeps settings from fast to exact, in the place of those before.
-    pub(crate) fn keep_rungs(&self, rungs: Vec<RungRow>) {
+    pub(crate) fn keep_rungs(&self, rungs: Vec<RungRow>, is_predicting: bool) {
         let mut papers = self.papers();
-        if papers.rungs.as_ref() != Some(&rungs) {
+        if papers.rungs.as_ref() != Some(&rungs) || papers.is_predicting != is_predicting {
             papers.rungs = Some(rungs);
+            papers.is_predicting = is_predicting;
             self.tell(papers);
         }
     }

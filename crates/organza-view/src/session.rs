@@ -121,6 +121,8 @@ pub struct ShownAccuracy {
     pub set: Vec<String>,
     /// The positions, from the fastest; empty before a whole picture with the scene's stated settings is drawn.
     pub rungs: Vec<RungRow>,
+    /// Whether times of some positions are still to be predicted.
+    pub is_predicting: bool,
 }
 
 /// The viewpoint of the eye, as the page shows it.
@@ -389,7 +391,7 @@ impl Session {
     /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, columns, rungs } =
+        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, columns, rungs, is_predicting } =
             self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         let row = |(rank, object): (usize, &SceneObject)| ObjectRow {
@@ -436,6 +438,7 @@ impl Session {
                 step: studio.state.accuracy().step,
                 set: studio.state.accuracy().texts(),
                 rungs,
+                is_predicting,
             }),
             technique: studio.state.technique().map(str::to_owned),
             kept: self.kept().as_ref().map(|keeping| keeping.kept.row.clone()),

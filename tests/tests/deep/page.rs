@@ -161,6 +161,24 @@ fn points_are_coloured_by_a_column_and_drawn_by_another_technique() {
 }
 
 #[test]
+fn positions_of_accuracy_come_with_their_times_and_change_the_picture() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.value("at('accuracy-panel').open = true");
+    page.wait_for("shown.accuracy && !shown.accuracy.is_predicting && shown.accuracy.rungs.length > 2");
+    assert_eq!(page.value("shown.accuracy.rungs.some((rung) => rung.predicted_ms > 0)"), true);
+    assert_eq!(page.value("/predicted/.test(at('accuracy-text').textContent)"), true);
+    page.value("at('accuracy').value = at('accuracy').max, at('accuracy').dispatchEvent(new Event('change'))");
+    page.wait_for("shown.accuracy.step > 0 && shown.accuracy.set.length > 0");
+    page.wait_for(WHOLE);
+    page.wait_for("shown.accuracy.rungs.at(-1).measured_ms > 0 && shown.accuracy.rungs.at(-1).is_reference");
+    page.value("at('accuracy-reset').click()");
+    page.wait_for("shown.accuracy.step === 0");
+    ends_well(&page, view);
+}
+
+#[test]
 fn a_broken_scene_is_told_and_a_mended_one_is_drawn() {
     let place = Place::new(SMALL_SCENE);
     let view = View::start(&place, &["s.toml", "--watch"]);

@@ -43,6 +43,7 @@ pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
             found.push(Change { table: (*table).into(), key, value: Some(value.clone()) });
         }
     }
+    add_slicing(&request.scene.render, &mut found);
     let gone = before.iter().filter(|(table, key, _)| value_in(&after, table, key).is_none());
     found.extend(gone.map(|(table, key, _)| Change { table: (*table).into(), key, value: None }));
     // The layout of a file: a table is opened once.
@@ -57,6 +58,20 @@ pub fn changes(as_written: &Scene, request: &Request) -> Vec<Change> {
         }
     }
     found
+}
+
+/// Slabs that carry light, where what they alone have is changed: a scene that leaves their slicing to the plan would be refused with that.
+fn add_slicing(render: &RenderSettings, found: &mut Vec<Change>) {
+    const OF_CARRIED: [&str; 4] = ["light_pixels", "soft_shadows", "scattering_cone", "voxels_per_cell"];
+    let Slicing::HalfVector { scattering, .. } = render.sheets.slicing else { return };
+    let Some(first) = found.iter().position(|change| OF_CARRIED.contains(&change.key)) else { return };
+    let mut add = |key, value: &str| {
+        found.insert(first, Change { table: "render.sheets".into(), key, value: Some(quoted(value)) });
+    };
+    if let Some(scattering) = scattering {
+        add("scattering", if scattering.back { "forward_and_back" } else { "forward" });
+    }
+    add("slicing", "half_vector");
 }
 
 /// The same as TOML to copy. Settings that no line of a table can state become comments.

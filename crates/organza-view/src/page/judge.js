@@ -34,7 +34,11 @@ function showAccuracy(found) {
   if (rungs.length === 0) {
     at("accuracy-text").textContent = accuracy.set.length > 0
       ? `Drawn with ${accuracy.set.join(", ")}. Positions are known once the scene was drawn as it is.`
-      : "Comes with the whole picture.";
+      : accuracy.is_predicting
+        ? "Looking for positions, and what each would take …"
+        : found.is_whole
+          ? "There are no positions: splats of this picture serve no other."
+          : "Comes with the whole picture.";
     return;
   }
   slider.max = rungs.length - 1;
@@ -43,7 +47,7 @@ function showAccuracy(found) {
   const rung = rungs[held === null ? chosen : held];
   const isOther = rung.step === accuracy.step && rung.set.join() !== accuracy.set.join();
   const set = isOther ? accuracy.set : rung.set;
-  at("accuracy-text").textContent = textOfRung(rung, isOther);
+  at("accuracy-text").textContent = textOfRung(rung, isOther) + (accuracy.is_predicting ? " Times are being predicted …" : "");
   slider.setAttribute("aria-valuetext", POSITIONS[rung.step]);
   at("lines").textContent = isOther ? set.join("\n") : rung.lines.trim() || "# as it is";
   const cells = (row) => [
