@@ -254,7 +254,8 @@ fn map_bytes(timed: &[Timed]) -> String {
 /// The families, row by row.
 fn families(csv: &str) -> String {
     let mut text = "## Families\n\nScenes of 32x24 pixels in which one number grows from invisible to plain. The tests draw each with the effect on, off and as planned. \
-                    `cargo xtask effects` draws other numbers each time.\n\n\
+                    `cargo xtask effects` draws other numbers each time. Where the share is small, a bound takes for black what is not: a shadow could make anything black, where a displayed \
+                    value is 29 times as steep as at white.\n\n\
                     | effect | what grows | settings | first visible | last left out | share of it | largest change that was left out, tolerances | bound over change, median |\n\
                     |---|---|---|---|---|---|---|---|\n"
         .to_owned();
