@@ -3,7 +3,7 @@
 use crate::depths::{Depths, PicturePlace};
 use crate::picture::Drawn;
 use organza::SourceData;
-use organza::scene::{Scene, SceneObject};
+use organza::scene::{ObjectLabels, Scene, SceneObject, Source};
 use serde::Serialize;
 use splat_core::glam::DVec3;
 use splat_core::{Grid, RawPoints};
@@ -34,8 +34,16 @@ pub struct Below {
 pub struct NamedValue {
     /// `value` of a volume; the name of a column of points.
     pub name: String,
-    /// The number; of points that of the nearest one.
+    /// The number; of points that of the nearest one, of labels that of the region there.
     pub value: f64,
+    /// The name of a label.
+    pub meaning: Option<String>,
+}
+
+impl NamedValue {
+    fn new(name: impl Into<String>, value: f64) -> Self {
+        Self { name: name.into(), value, meaning: None }
+    }
 }
 
 /// Data of an object, as long as something else keeps them.
@@ -60,6 +68,10 @@ impl DataOfObject {
         let transform = &object.transform;
         let local = transform.rotation.inverse() * (place - transform.translation) / transform.scale;
         match self {
+            // A volume whose regions are surfaces.
+            Self::Volume(grid) if matches!(object.source, Source::Mesh(_)) => {
+                grid.upgrade().and_then(|grid| of_labels(&grid, local, object.labels.as_ref())).into_iter().collect()
+            }
             Self::Volume(grid) => grid.upgrade().and_then(|grid| of_volume(&grid, local)).into_iter().collect(),
             Self::Points(points) => points.upgrade().map_or_else(Vec::new, |points| of_points(&points, local)),
         }
@@ -83,7 +95,28 @@ fn of_volume(grid: &Grid, place: DVec3) -> Option<NamedValue> {
         if weight > 0.0 { weight * f64::from(value) } else { 0.0 }
     };
     let value: f64 = (0..8).map(value).sum();
-    value.is_finite().then(|| NamedValue { name: "value".to_owned(), value })
+    value.is_finite().then(|| NamedValue::new("value", value))
+}
+
+/// The label around a place on the surface of a region: the one with most of the eight voxels about it, the nearer ones weighing more. 0 is nothing.
+fn of_labels(grid: &Grid, place: DVec3, labels: Option<&ObjectLabels>) -> Option<NamedValue> {
+    let at = grid.axes.inverse() * (place - grid.origin);
+    let low = at.floor();
+    let share = at - low;
+    let mut weights: Vec<(f32, f64)> = Vec::with_capacity(8);
+    for corner in 0..8 {
+        let step = |k: usize| (corner >> k & 1) as isize;
+        let weight = (0..3).map(|k| if step(k) == 1 { share[k] } else { 1.0 - share[k] }).product::<f64>();
+        let label = grid.at_clamped(low.x as isize + step(0), low.y as isize + step(1), low.z as isize + step(2));
+        match weights.iter_mut().find(|(known, _)| *known == label) {
+            Some((_, sum)) => *sum += weight,
+            None => weights.push((label, weight)),
+        }
+    }
+    let regions = weights.into_iter().filter(|(label, _)| *label > 0.0);
+    let (label, _) = regions.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let meaning = labels.and_then(|labels| labels.table.name(f64::from(label))).map(str::to_owned);
+    Some(NamedValue { meaning, ..NamedValue::new("label", f64::from(label)) })
 }
 
 /// The numbers of the nearest point.
@@ -96,7 +129,7 @@ fn of_points(points: &RawPoints, place: DVec3) -> Vec<NamedValue> {
     let scalar = points.value.get(rank).map(|value| (points.value_name().to_owned(), f64::from(*value)));
     let class = points.classification.get(rank).map(|class| ("classification".to_owned(), f64::from(*class)));
     let named = of_columns.chain(scalar).chain(class).filter(|(_, value)| value.is_finite());
-    named.map(|(name, value)| NamedValue { name, value }).take(MOST_COLUMNS).collect()
+    named.map(|(name, value)| NamedValue::new(name, value)).take(MOST_COLUMNS).collect()
 }
 
 /// What lies below a place of the picture.
@@ -142,6 +175,17 @@ mod tests {
         let found = of_volume(&grid, DVec3::new(1.25, 2.5, 3.125)).unwrap();
         assert!((found.value - (0.5 + 10.0 + 25.0)).abs() < 1e-12);
         assert_eq!(of_volume(&grid, DVec3::ZERO), None);
+    }
+
+    #[test]
+    fn a_label_is_that_of_the_region_and_never_between_two() {
+        // Nothing, label 3 from x = 1 on, label 8 from x = 3 on.
+        let value = |n: usize| [0.0, 3.0, 3.0, 8.0][n % 4];
+        let grid =
+            Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4, 2, 2], values: (0..16).map(value).collect() };
+        let label_at = |x: f64| of_labels(&grid, DVec3::new(x, 0.5, 0.5), None).map(|found| found.value);
+        let found = [-0.9, 0.1, 0.5, 2.0, 2.4, 2.6].map(label_at);
+        assert_eq!(found, [None, Some(3.0), Some(3.0), Some(3.0), Some(3.0), Some(8.0)]);
     }
 
     #[test]

@@ -233,7 +233,7 @@ function belowText(below) {
   if (below.object !== null) words.push(below.object);
   if (below.position) words.push(`at ${below.position.map(short).join(", ")}`, `depth ${short(below.depth)}`);
   else words.push("nothing that hides what lies behind it");
-  for (const { name, value } of below.values) words.push(`${name} ${short(value)}`);
+  for (const { name, value, meaning } of below.values) words.push(`${name} ${short(value)}${meaning ? ` ${meaning}` : ""}`);
   if (below.numbers.length > 0) {
     // An infinite number comes as none.
     const number = (value) => (value === null ? "none" : Math.abs(value) < 1e-3 && value !== 0 ? value.toExponential(1) : String(Number(value.toPrecision(3))));
