@@ -2,7 +2,8 @@
 //!
 //! A plain table of minima: other work on the machine only ever adds time. The second number of each part is the time of all
 //! threads on processors, which other work adds less to. The error is the RMSE of linear colours to slabs an eighth as wide and no
-//! pixel ever done, of the file's lattice and by the paper's method whatever the row has. `benches/peers/vtk_volume.py` has the same rows by VTK.
+//! pixel ever done, of the file's lattice, gathered by the row's kernel where the row gathers and else by the paper's method. `step` is the width of a
+//! slab, millimetres. `benches/peers/vtk_volume.py` has the same rows by VTK, `benches/peers/volume_table.py` prints both beside each other.
 //!
 //! `-- WORD` draws the rows whose name has it. `-- FILE` draws that volume in the place of the head, and `-- dense` one of 256³ voxels
 //! that are all visible: views, transfer functions and extinctions are the head's, stretched over the range of its values and by its diagonal.
@@ -97,8 +98,8 @@ fn main() {
         Method { name: " 2 wide", width: 2.0, ..paper },
     ];
     println!(
-        "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8}",
-        "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded", "RMSE"
+        "{:>28} {:>12} {:>12} {:>7} {:>9} {:>7} {:>11} {:>10} {:>8} {:>8}",
+        "ms", "prepare", "fold", "M vox", "M splats", "M frag", "M frag/s", "M shaded", "RMSE", "step"
     );
     for pixels in [400, 512] {
         for (class, tf) in [("semi", &semi), ("iso", &iso)] {
@@ -165,23 +166,28 @@ fn row(name: &str, [method, paper]: [&Method<'_>; 2], transfer: &TransferFunctio
         }
     }
     record(&format!("sheets/{name}"), &clock, counts.visible);
-    let fine = fine(SheetInput { volumes: vec![paper.volume(transfer, &material, lit)], ..input }, &layout);
+    let exact = match method.reconstruction {
+        Reconstruction::Splat => SheetInput { volumes: vec![paper.volume(transfer, &material, lit)], ..input.clone() },
+        Reconstruction::Gather(_) => input.clone(),
+    };
+    let fine = fine(exact, method.reconstruction, &layout);
     let million = |n: u64| n as f64 * 1e-6;
     let [prepared, folded] = best.map(|[wall, busy]| format!("{wall:.1} {busy:.0}"));
     println!(
-        "{name:>28} {prepared:>12} {folded:>12} {:7.2} {:9.2} {:7.1} {:11.0} {:10.1} {:8.5}",
+        "{name:>28} {prepared:>12} {folded:>12} {:7.2} {:9.2} {:7.1} {:11.0} {:10.1} {:8.5} {:8.5}",
         million(counts.visible),
         million(counts.records),
         million(counts.fragments),
         million(counts.fragments) / best[1][0] * 1e3,
         million(counts.shaded),
         rmse(&out, &fine),
+        slab_width.unwrap_or_else(step),
     );
 }
 
 /// Slabs an eighth as wide as the lattice's steps, and no pixel ever done.
-fn fine(input: SheetInput<'_>, layout: &ChannelLayout) -> Accumulator {
-    let exact = Params { transmittance_cutoff: 0.0, ..Params::default() };
+fn fine(input: SheetInput<'_>, reconstruction: Reconstruction, layout: &ChannelLayout) -> Accumulator {
+    let exact = Params { reconstruction, transmittance_cutoff: 0.0, ..Params::default() };
     let width = prepare(input.clone(), &exact, None).expect("a volume that can be drawn").slabs().1;
     let params = Params { slab_width: Some(0.125 * width), ..exact };
     let mut fine = Accumulator::new(input.camera.size, 1, 3, false, false);
