@@ -6,20 +6,47 @@
 use super::tile::rays::{Crossings, Slopes};
 use super::tile::sheets::Sheets;
 use super::tile::size::SIDE;
-use crate::shared::gathered::Gathered;
+use crate::shared::depths::DepthRange;
 use crate::shared::gathered::bricks::Box3;
+use crate::shared::gathered::{Corner, Gathered};
 use crate::shared::lattice::rays::LatticeRays;
 use crate::shared::slabs::{BATCH, Slabs};
 use crate::shared::vectors::COUNTING;
 use splat_core::glam::DVec3;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
+use std::ops::Range;
 
-/// Neighbouring pixels of a sheet in lattice coordinates: pixel n of the row at `first` + n·`step`.
+/// Neighbouring pixels that are read together. As many on every machine: their places are counted from a corner of all of them, and so have the same bits.
+pub(crate) const GROUP: usize = MAX_LANES;
+
+/// Groups of a row of a tile, without its rim.
+pub(crate) const GROUPS: usize = (SIDE - 2) / GROUP;
+
+/// Rows of a block that is looked at as a whole before any of them.
+const ROWS: usize = 8;
+
+/// Pixels of a group, from the first column of the tile on.
+const GROUP_BITS: u64 = ((1 << GROUP) - 1) << 1;
+
+/// The pixels of a row that belong to the rim.
+const RIM_BITS: u64 = 1 | 1 << (SIDE - 1);
+
+/// The same as places in the row; further lanes are the last one.
+const RIM_PLACES: [f32; GROUP] = {
+    let mut places = [(SIDE - 1) as f32; GROUP];
+    places[0] = 0.0;
+    places
+};
+
+/// The sheets of a batch in a row of a tile, in lattice coordinates: pixel x of slab n at `first` + x·`across` + n·(`behind` + x·`wider`).
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Row {
+struct Ribbon {
     first: DVec3,
-    step: DVec3,
+    across: DVec3,
+    behind: DVec3,
+    /// Zero of parallel rays.
+    wider: DVec3,
 }
 
 /// What one sheet's row of a tile asks for.
@@ -30,48 +57,39 @@ pub(crate) struct SheetLines<'a> {
     pub(crate) crossings: &'a Crossings,
 }
 
-impl Row {
-    fn new(first: DVec3, last: DVec3) -> Self {
-        Self { first, step: (last - first) / (SIDE - 1) as f64 }
+impl Ribbon {
+    #[inline(always)]
+    fn place(&self, x: usize, slab: u32) -> DVec3 {
+        let x = x as f64;
+        self.first + self.across * x + (self.behind + self.wider * x) * f64::from(slab)
     }
 
-    /// The cells between two of its pixels.
+    /// Its places in the first and the last slab between two pixels: all others lie among them.
     #[inline(always)]
-    fn between(&self, from: usize, to: usize) -> Box3 {
-        Box3::around([self.first + self.step * from as f64, self.first + self.step * to as f64])
+    fn ends(&self, from: usize, to: usize) -> [DVec3; 4] {
+        [self.place(from, 0), self.place(to, 0), self.place(from, BATCH - 1), self.place(to, BATCH - 1)]
     }
 
-    /// Values of the pixels of a row that `mask` has and that may show anything, and which these are, a bit each.
+    /// Reads the lattice for pixels of a slab: those that `offsets` are the places of, counted from pixel `x`.
     #[inline(always)]
-    fn values<S: Simd>(&self, simd: S, lattice: &Gathered<'_>, mask: u64, out: &mut [f32]) -> u64 {
-        let mut tags = 0;
-        for x in (0..SIDE).step_by(Lanes::<S>::COUNT) {
-            let bits = ((1 << Lanes::<S>::COUNT) - 1) << x & ((1 << SIDE) - 1);
-            if mask & bits == 0 {
-                continue;
-            }
-            let part = self.between(x, x + Lanes::<S>::COUNT - 1);
-            if !lattice.shows(&part) {
-                continue;
-            }
-            tags |= bits;
-            let corner = lattice.corner(&part);
-            let counting = Lanes::load(simd, &COUNTING);
-            let mut places = [counting; 3];
-            for a in 0..3 {
-                let first = corner.from(a, self.first[a] + self.step[a] * x as f64);
-                places[a] = counting.mul_add(Lanes::splat(simd, self.step[a] as f32), Lanes::splat(simd, first as f32));
-            }
-            let value = lattice.values(simd, &corner, &places);
-            if x + Lanes::<S>::COUNT <= SIDE {
-                value.store(&mut out[x..]);
-            } else {
-                let mut values = [0.0; MAX_LANES];
-                value.store(&mut values);
-                out[x..SIDE].copy_from_slice(&values[..SIDE - x]);
-            }
+    fn read<S: Simd>(
+        &self,
+        simd: S,
+        lattice: &Gathered<'_>,
+        corner: &Corner,
+        x: usize,
+        slab: u32,
+        offsets: &[f32],
+    ) -> Lanes<S> {
+        let first = self.place(x, slab);
+        let step = self.across + self.wider * f64::from(slab);
+        let offsets = Lanes::load(simd, offsets);
+        let mut places = [offsets; 3];
+        for a in 0..3 {
+            let first = Lanes::splat(simd, corner.from(a, first[a]) as f32);
+            places[a] = offsets.mul_add(Lanes::splat(simd, step[a] as f32), first);
         }
-        tags
+        lattice.values(simd, corner, &places)
     }
 }
 
@@ -86,49 +104,116 @@ impl SheetLines<'_> {
         mask: &[u64; SIDE],
         sheets: &mut Sheets,
     ) -> u64 {
-        let mut pixels = 0;
         let first = batch * BATCH;
-        let corners = |slab: u32| {
-            [[0, 0], [SIDE - 1, 0], [0, SIDE - 1], [SIDE - 1, SIDE - 1]].map(|[x, y]| self.place(slab, x, y))
-        };
-        let whole = corners(first).into_iter().chain(corners(first + BATCH - 1));
-        let is_seen = lattice.shows(&Box3::around(whole));
-        for slab in first..first + BATCH {
-            for y in 0..SIDE {
-                let mut tags = 0;
-                if is_seen && mask[y] != 0 {
-                    let row = Row::new(self.place(slab, 0, y), self.place(slab, SIDE - 1, y));
-                    if lattice.shows(&row.between(0, SIDE - 1)) {
-                        let inside = self.inside(simd, slab, y);
-                        tags = row.values(simd, lattice, mask[y] & inside, sheets.begin_values(slab, y));
+        let mut tags = [[0; SIDE]; BATCH as usize];
+        if lattice.shows(&self.block(first, 0..SIDE, 0, SIDE - 1)) {
+            for top in (0..SIDE).step_by(ROWS) {
+                let rows = top..(top + ROWS).min(SIDE);
+                let open = mask[rows.clone()].iter().fold(0, |open, row| open | row);
+                if open == 0 {
+                    continue;
+                }
+                let mut is_seen = [false; GROUPS];
+                for (g, is_seen) in is_seen.iter_mut().enumerate() {
+                    let x = 1 + g * GROUP;
+                    *is_seen = open & (GROUP_BITS << (g * GROUP)) != 0
+                        && lattice.shows(&self.block(first, rows.clone(), x, x + GROUP - 1));
+                }
+                for y in rows {
+                    if mask[y] != 0 && (mask[y] & RIM_BITS != 0 || is_seen != [false; GROUPS]) {
+                        self.row(simd, lattice, first, y, mask[y], &is_seen, sheets, &mut tags);
                     }
                 }
-                pixels += u64::from(tags.count_ones());
-                sheets.finish_row(slab, y, tags);
             }
+        }
+        let mut pixels = 0;
+        for (slab, tags) in (first..).zip(&tags) {
+            pixels += tags.iter().map(|row| u64::from(row.count_ones())).sum::<u64>();
+            sheets.finish(slab, tags);
         }
         pixels
     }
 
-    /// The pixels of a row whose rays are inside the volume in a slab, or in one of those beside it, a bit each.
+    /// Reads a row in the slabs of a batch, from slab `first` on.
     #[inline(always)]
-    fn inside<S: Simd>(&self, simd: S, slab: u32, y: usize) -> u64 {
-        let begin = Lanes::splat(simd, self.slabs.face(slab.saturating_sub(1)));
-        let end = Lanes::splat(simd, self.slabs.face(slab + 2));
-        let mut bits = 0;
-        for x in (0..SIDE).step_by(Lanes::<S>::COUNT) {
-            let near = Lanes::load(simd, &self.crossings.near[y * SIDE + x..]).max(begin);
-            let far = Lanes::load(simd, &self.crossings.far[y * SIDE + x..]).min(end);
-            if near.any_less(far) {
-                bits |= ((1 << Lanes::<S>::COUNT) - 1) << x;
+    fn row<S: Simd>(
+        &self,
+        simd: S,
+        lattice: &Gathered<'_>,
+        first: u32,
+        y: usize,
+        mask: u64,
+        is_seen: &[bool; GROUPS],
+        sheets: &mut Sheets,
+        tags: &mut [[u64; SIDE]; BATCH as usize],
+    ) {
+        let ribbon = self.ribbon(first, y);
+        for g in 0..GROUPS {
+            let x = 1 + g * GROUP;
+            let bits = GROUP_BITS << (g * GROUP);
+            let inside = self.inside(first, y, g);
+            if mask & bits == 0 || !is_seen[g] || inside.is_empty() {
+                continue;
+            }
+            let part = Box3::around(ribbon.ends(x, x + GROUP - 1));
+            if !lattice.shows(&part) {
+                continue;
+            }
+            let corner = lattice.corner(&part);
+            for slab in inside {
+                let out = sheets.row_mut(first + slab, y);
+                for lane in (0..GROUP).step_by(Lanes::<S>::COUNT) {
+                    ribbon.read(simd, lattice, &corner, x, slab, &COUNTING[lane..]).store(&mut out[x + lane..]);
+                }
+                tags[slab as usize][y] |= bits;
             }
         }
-        bits & ((1 << SIDE) - 1)
+        if mask & RIM_BITS == 0 {
+            return;
+        }
+        let part = Box3::around(ribbon.ends(0, SIDE - 1));
+        if !lattice.shows(&part) {
+            return;
+        }
+        let corner = lattice.corner(&part);
+        for slab in 0..BATCH {
+            let mut values = [0.0; GROUP];
+            for lane in (0..2).step_by(Lanes::<S>::COUNT) {
+                ribbon.read(simd, lattice, &corner, 0, slab, &RIM_PLACES[lane..]).store(&mut values[lane..]);
+            }
+            let out = sheets.row_mut(first + slab, y);
+            out[0] = values[0];
+            out[SIDE - 1] = values[1];
+            tags[slab as usize][y] |= RIM_BITS;
+        }
     }
 
-    /// Lattice coordinates of a pixel in the middle of a slab.
+    /// The slabs of a batch, counted from its first one, in which or beside which any ray of a group is inside the volume.
     #[inline(always)]
-    fn place(&self, slab: u32, x: usize, y: usize) -> DVec3 {
-        self.rays.place(self.slopes.ray(x, y), (f64::from(slab) + 0.5) * self.slabs.width)
+    fn inside(&self, first: u32, y: usize, group: usize) -> Range<u32> {
+        let DepthRange { near, far } = self.crossings.groups[y * GROUPS + group];
+        let is_inside =
+            |slab: u32| near < self.slabs.face(first + slab + 2) && far > self.slabs.face((first + slab).max(1) - 1);
+        let begin = (0..BATCH).find(|slab| is_inside(*slab)).unwrap_or(BATCH);
+        begin..(begin..BATCH).find(|slab| !is_inside(*slab)).unwrap_or(BATCH)
+    }
+
+    /// The cells of some pixels of some rows in a batch, and all between them.
+    #[inline(always)]
+    fn block(&self, first: u32, rows: Range<usize>, from: usize, to: usize) -> Box3 {
+        let top = self.ribbon(first, rows.start).ends(from, to);
+        let bottom = self.ribbon(first, rows.end - 1).ends(from, to);
+        Box3::around(top.into_iter().chain(bottom))
+    }
+
+    #[inline(always)]
+    fn ribbon(&self, first: u32, y: usize) -> Ribbon {
+        let depth = (f64::from(first) + 0.5) * self.slabs.width;
+        let pixels = (SIDE - 1) as f64;
+        let [left, right] = [0, SIDE - 1].map(|x| self.rays.line(self.slopes.ray(x, y), depth));
+        let across = (right.start - left.start) / pixels;
+        let behind = left.along * self.slabs.width;
+        let wider = (right.along - left.along) * (self.slabs.width / pixels);
+        Ribbon { first: left.start, across, behind, wider }
     }
 }

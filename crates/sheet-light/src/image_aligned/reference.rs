@@ -149,7 +149,7 @@ impl Sheets {
         for slab in 0..self.slabs.count as usize {
             let depth = (slab as f64 + 0.5) * self.slabs.width;
             for at in 0..pixels {
-                self.values[slab * pixels + at] = lattice.at(rays.place(ray(at), depth));
+                self.values[slab * pixels + at] = lattice.at(rays.line(ray(at), depth).start);
                 self.weights[slab * pixels + at] = 1.0;
             }
         }

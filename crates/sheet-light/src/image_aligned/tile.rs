@@ -9,6 +9,7 @@ pub(crate) mod preclassified;
 pub(crate) mod queue;
 pub(crate) mod rays;
 pub(crate) mod ring;
+pub(crate) mod run;
 pub(crate) mod shade;
 pub(crate) mod sheets;
 pub(crate) mod size;

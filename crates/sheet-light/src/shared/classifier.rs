@@ -54,18 +54,39 @@ impl Classifier {
     /// Extinction, red, green and blue.
     #[inline(always)]
     pub(crate) fn classify<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
+        if self.pieces.len() > FEW { self.look_up(simd, value) } else { self.some(simd, value, [0, 1, 2, 3]) }
+    }
+
+    /// The same, where none of the lanes has extinction any colours.
+    #[inline(always)]
+    pub(crate) fn classify_seen<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
         if self.pieces.len() > FEW {
             return self.look_up(simd, value);
         }
-        let broadcast = |v: f32| Lanes::splat(simd, v);
-        let mut out =
-            [broadcast(self.first[0]), broadcast(self.first[1]), broadcast(self.first[2]), broadcast(self.first[3])];
+        let [extinction] = self.some(simd, value, [0]);
+        if !Lanes::splat(simd, 0.0).any_less(extinction) {
+            return [extinction; 4];
+        }
+        let [red, green, blue] = self.some(simd, value, [1, 2, 3]);
+        [extinction, red, green, blue]
+    }
+
+    /// Some of the four numbers, piece by piece.
+    #[inline(always)]
+    fn some<S: Simd, const N: usize>(&self, simd: S, value: Lanes<S>, numbers: [usize; N]) -> [Lanes<S>; N] {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut out = [zero; N];
+        for n in 0..N {
+            out[n] = Lanes::splat(simd, self.first[numbers[n]]);
+        }
         for piece in &self.pieces {
-            let knot = broadcast(piece.value);
+            let knot = Lanes::splat(simd, piece.value);
             let beyond = value - knot;
-            for c in 0..4 {
-                let here = broadcast(piece.slope[c]).mul_add(beyond, broadcast(piece.start[c])).max(broadcast(0.0));
-                out[c] = out[c].where_less_or(value, knot, here);
+            for n in 0..N {
+                let c = numbers[n];
+                let start = Lanes::splat(simd, piece.start[c]);
+                let here = Lanes::splat(simd, piece.slope[c]).mul_add(beyond, start).max(zero);
+                out[n] = out[n].where_less_or(value, knot, here);
             }
         }
         out

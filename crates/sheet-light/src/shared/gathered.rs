@@ -131,14 +131,13 @@ impl<'a> Gathered<'a> {
     /// Values at places that are counted from a corner, relative to the volume's base.
     #[inline(always)]
     pub(crate) fn values<S: Simd>(&self, simd: S, corner: &Corner, places: &[Lanes<S>; 3]) -> Lanes<S> {
-        let mut values = [0.0; MAX_LANES];
-        match self.kernel {
-            GatherKernel::Linear => self.linear(simd, corner.start, places, &corner.last, &mut values),
-            GatherKernel::Gaussian => self.cubic(simd, corner.start, places, &corner.last, &mut values),
-        }
+        let value = match self.kernel {
+            GatherKernel::Linear => self.linear(simd, corner.start, places, &corner.last),
+            GatherKernel::Gaussian => self.cubic(simd, corner.start, places, &corner.last),
+        };
         let relative = self.relative;
-        let value = Lanes::load(simd, &values) - Lanes::splat(simd, relative.high);
-        (value - Lanes::splat(simd, relative.low)) * Lanes::splat(simd, relative.factor)
+        (value - Lanes::splat(simd, relative.high) - Lanes::splat(simd, relative.low))
+            * Lanes::splat(simd, relative.factor)
     }
 
     /// The first voxels of the cells of places, which are counted from `start`, and how far behind these the places lie along each axis: in \[0, 1\], and
@@ -154,64 +153,55 @@ impl<'a> Gathered<'a> {
         let natural = Lanes::splat(simd, NATURAL);
         let outside = self.kernel.outside();
         let mut parts = *places;
-        let mut firsts = [start; MAX_LANES];
-        let mut stride = 1;
+        let mut cells = [[0.0f32; MAX_LANES]; 3];
         for a in 0..3 {
             let place = places[a].max(Lanes::splat(simd, -outside)).min(Lanes::splat(simd, last[a] + 1.0 + outside));
             // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
             let rounded = (place - Lanes::splat(simd, 0.5)) + natural;
             let cell = rounded.max(natural).min(Lanes::splat(simd, NATURAL + last[a]));
             parts[a] = place - (cell - natural);
-            let mut stored = [0.0f32; MAX_LANES];
-            cell.store(&mut stored);
-            for lane in 0..Lanes::<S>::COUNT {
-                firsts[lane] += stride * (stored[lane].to_bits() - NATURAL.to_bits()) as usize;
-            }
-            stride *= self.stored[a];
+            cell.store(&mut cells[a]);
+        }
+        let row = self.stored[0];
+        let plane = row * self.stored[1];
+        // Of natural numbers as they are stored, what they all have too much.
+        let start = start.wrapping_sub((NATURAL.to_bits() as usize).wrapping_mul(1 + row + plane));
+        let mut firsts = [0; MAX_LANES];
+        for lane in 0..Lanes::<S>::COUNT {
+            let cell = |a: usize| cells[a][lane].to_bits() as usize;
+            let along = start.wrapping_add(cell(0)).wrapping_add(cell(1).wrapping_mul(row));
+            firsts[lane] = along.wrapping_add(cell(2).wrapping_mul(plane));
         }
         (firsts, parts)
     }
 
     /// Linear between the eight voxels around each place; `start` is the voxel that places are counted from.
     #[inline(always)]
-    fn linear<S: Simd>(
-        &self,
-        simd: S,
-        start: usize,
-        places: &[Lanes<S>; 3],
-        last: &[f32; 3],
-        out: &mut [f32; MAX_LANES],
-    ) {
+    fn linear<S: Simd>(&self, simd: S, start: usize, places: &[Lanes<S>; 3], last: &[f32; 3]) -> Lanes<S> {
         let [nx, ny, _] = self.stored;
         let (firsts, parts) = self.cells(simd, start, places, last);
+        // As many of each corner, so that one check of a place does for all of them.
+        let count = self.values.len() - (nx * ny + nx + 1);
+        let offsets = [0, 1, nx, nx + 1, nx * ny, nx * ny + 1, nx * ny + nx, nx * ny + nx + 1];
+        let mut from = [&self.values[..]; 8];
+        for c in 0..8 {
+            from[c] = &self.values[offsets[c]..offsets[c] + count];
+        }
         let mut corners = [[0.0; MAX_LANES]; 8];
         for lane in 0..Lanes::<S>::COUNT {
             let here = firsts[lane];
-            for (row, at) in [here, here + nx, here + nx * ny, here + nx * ny + nx].into_iter().enumerate() {
-                let pair = &self.values[at..at + 2];
-                corners[2 * row][lane] = pair[0];
-                corners[2 * row + 1][lane] = pair[1];
+            for c in 0..8 {
+                corners[c][lane] = from[c][here];
             }
         }
-        let between = |low: Lanes<S>, high: Lanes<S>, part: Lanes<S>| (high - low).mul_add(part, low);
-        let edge = |row: usize| {
-            between(Lanes::load(simd, &corners[2 * row]), Lanes::load(simd, &corners[2 * row + 1]), parts[0])
-        };
-        let near = between(edge(0), edge(1), parts[1]);
-        let far = between(edge(2), edge(3), parts[1]);
-        between(near, far, parts[2]).store(out);
+        let near = between(edge(simd, &corners, 0, parts[0]), edge(simd, &corners, 2, parts[0]), parts[1]);
+        let far = between(edge(simd, &corners, 4, parts[0]), edge(simd, &corners, 6, parts[0]), parts[1]);
+        between(near, far, parts[2])
     }
 
     /// A cubic B-spline of the 64 voxels around each place.
     #[inline(always)]
-    fn cubic<S: Simd>(
-        &self,
-        simd: S,
-        start: usize,
-        places: &[Lanes<S>; 3],
-        last: &[f32; 3],
-        out: &mut [f32; MAX_LANES],
-    ) {
+    fn cubic<S: Simd>(&self, simd: S, start: usize, places: &[Lanes<S>; 3], last: &[f32; 3]) -> Lanes<S> {
         let [nx, ny, _] = self.stored;
         let (firsts, parts) = self.cells(simd, start, places, last);
         let mut weights = [[[0.0; MAX_LANES]; 4]; 3];
@@ -222,6 +212,7 @@ impl<'a> Gathered<'a> {
             third.store(&mut weights[a][2]);
             fourth.store(&mut weights[a][3]);
         }
+        let mut out = [0.0; MAX_LANES];
         for lane in 0..Lanes::<S>::COUNT {
             let corner = firsts[lane] - (nx * ny + nx + 1);
             let mut sums = [0.0f32; 4];
@@ -229,7 +220,7 @@ impl<'a> Gathered<'a> {
                 let mut plane = [0.0f32; 4];
                 for j in 0..4 {
                     let at = corner + (k * ny + j) * nx;
-                    let Some(row) = self.values[at..].first_chunk::<4>() else { return };
+                    let Some(row) = self.values[at..].first_chunk::<4>() else { continue };
                     let weight = weights[1][j][lane];
                     for c in 0..4 {
                         plane[c] = weight.mul_add(row[c], plane[c]);
@@ -243,6 +234,7 @@ impl<'a> Gathered<'a> {
             let across = |c: usize| weights[0][c][lane] * sums[c];
             out[lane] = (across(0) + across(1)) + (across(2) + across(3));
         }
+        Lanes::load(simd, &out)
     }
 }
 
@@ -309,6 +301,20 @@ fn doubled(grid: &Grid) -> Vec<f32> {
         grid.values[(inside(k, 2) * grid.dims[1] + inside(j, 1)) * grid.dims[0] + inside(i, 0)]
     };
     (0..dims.iter().product()).map(value).collect()
+}
+
+// Functions, since closures are not always compiled into code for vectors.
+
+/// A part of the way from one value to another.
+#[inline(always)]
+fn between<S: Simd>(low: Lanes<S>, high: Lanes<S>, part: Lanes<S>) -> Lanes<S> {
+    (high - low).mul_add(part, low)
+}
+
+/// A part of the way from a corner of each cell to the next one.
+#[inline(always)]
+fn edge<S: Simd>(simd: S, corners: &[[f32; MAX_LANES]; 8], corner: usize, part: Lanes<S>) -> Lanes<S> {
+    between(Lanes::load(simd, &corners[corner]), Lanes::load(simd, &corners[corner + 1]), part)
 }
 
 /// The four shares of a cubic B-spline, a part `t` of a step behind the second voxel.

@@ -118,15 +118,21 @@ impl<'a> Lattice<'a> {
     pub(crate) fn row(&self, j: usize, k: usize, out: &mut Vec<f32>) {
         out.clear();
         let rim = self.rim[0];
-        let n = self.inner[0];
+        let [n, ny, _] = self.inner;
+        out.extend((0..rim).map(|i| self.value(i, j, k)));
         match self.inside(rim..rim + n, j, k) {
-            None => out.extend((0..self.dims[0]).map(|i| self.value(i, j, k))),
-            Some(values) => {
-                out.extend((0..rim).map(|i| self.value(i, j, k)));
-                out.extend_from_slice(values);
-                out.extend((rim + n..self.dims[0]).map(|i| self.value(i, j, k)));
+            None => {
+                // What [`Lattice::value`] sums, in its order.
+                let terms = self.terms(2, k).map(|(c, k)| self.terms(1, j).map(|(b, j)| (b * c, (k * ny + j) * n)));
+                let sum = |i: usize| {
+                    let shown = terms.iter().flatten().filter(|(share, _)| *share != 0.0);
+                    shown.fold(0.0, |sum, (share, row)| sum + share * f64::from(self.values[row + i])) as f32
+                };
+                out.extend((0..n).map(sum));
             }
+            Some(values) => out.extend_from_slice(values),
         }
+        out.extend((rim + n..self.dims[0]).map(|i| self.value(i, j, k)));
     }
 }
 

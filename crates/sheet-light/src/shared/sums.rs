@@ -25,15 +25,41 @@ pub(crate) fn rounded_one(sum: f32) -> f32 {
 /// Adds to sums that are too large by `excess`, or that are of half precision; the new sums.
 #[inline(always)]
 pub(crate) fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: Lanes<S>, half: bool) -> Lanes<S> {
-    let sum = Lanes::load(simd, sums);
     if half {
-        let new = rounded(simd, sum + term);
+        let new = rounded(simd, Lanes::load(simd, sums) + term);
         new.store(sums);
         return new;
     }
-    let term = term - Lanes::load(simd, excess);
-    let new = sum + term;
-    ((new - sum) - term).store(excess);
-    new.store(sums);
-    new
+    let mut exact = Sum::load(simd, sums, excess);
+    exact.add(term);
+    exact.store(sums, excess);
+    exact.sum
+}
+
+/// A sum that is too large by `excess` (Kahan).
+#[derive(Clone, Copy)]
+pub(crate) struct Sum<S: Simd> {
+    pub(crate) sum: Lanes<S>,
+    pub(crate) excess: Lanes<S>,
+}
+
+impl<S: Simd> Sum<S> {
+    #[inline(always)]
+    pub(crate) fn load(simd: S, sums: &[f32], excess: &[f32]) -> Self {
+        Self { sum: Lanes::load(simd, sums), excess: Lanes::load(simd, excess) }
+    }
+
+    #[inline(always)]
+    pub(crate) fn store(self, sums: &mut [f32], excess: &mut [f32]) {
+        self.sum.store(sums);
+        self.excess.store(excess);
+    }
+
+    #[inline(always)]
+    pub(crate) fn add(&mut self, term: Lanes<S>) {
+        let term = term - self.excess;
+        let new = self.sum + term;
+        self.excess = (new - self.sum) - term;
+        self.sum = new;
+    }
 }

@@ -203,6 +203,10 @@ impl<S: Simd> Lanes<S> {
     pub fn opacity(self) -> Self {
         let lanes = |v| Self::splat(self.simd, v);
         let small = self.min(lanes(SMALL)).opacity_of_small();
+        // The exponential is asked for where any lane takes it.
+        if !lanes(BELOW_SMALL).any_less(self) {
+            return small;
+        }
         small.where_less_or(self, lanes(SMALL), lanes(1.0) - self.exp_neg())
     }
 
@@ -240,6 +244,9 @@ const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
 
 /// Optical depth up to which a polynomial gives the opacity.
 pub(crate) const SMALL: f32 = 0.5;
+
+/// The number before it.
+const BELOW_SMALL: f32 = f32::from_bits(SMALL.to_bits() - 1);
 
 /// ((1 − e^−x)/x − 1)/x on [0, ½], the cubic of least error.
 const OPACITY: [f32; 4] = [-0.499_994_3, 0.166_561_98, -0.041_039_184, 0.006_804_911];

@@ -101,7 +101,7 @@ impl pulp::WithSimd for FoldTile<'_> {
         let mut counts = SheetCounts::default();
         let sheeted = self.sheeted;
         let corner = [self.t % sheeted.tiles[0] * TILE, self.t / sheeted.tiles[0] * TILE];
-        let mut picture = Picture::load(self.into, corner, &sheeted.params);
+        let mut picture = Picture::load(simd, self.into, corner, &sheeted.params);
         if picture.open.iter().all(|row| *row == 0) {
             counts.tiles_skipped = 1;
             return (None, counts);

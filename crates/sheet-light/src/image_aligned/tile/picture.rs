@@ -5,7 +5,7 @@
 
 use super::size::{SIDE, TILE};
 use crate::Params;
-use crate::shared::sums::add;
+use crate::shared::sums::{Sum, add};
 use splat_core::raster::lanes::{Lanes, MAX_LANES, exp_neg};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
@@ -53,11 +53,45 @@ pub(crate) struct Picture {
     pub(crate) open: [u64; SIDE],
     /// Of these, those where volumes may be seen: what is opaque lies behind.
     pub(crate) lit: [u64; SIDE],
+    /// Whether anything was composited since these were found.
+    is_changed: bool,
+}
+
+/// Neighbouring pixels of a tile that has one plane of optical depth and three channels, while slab after slab is added to them.
+pub(crate) struct Pixels<S: Simd> {
+    optical_depth: Sum<S>,
+    transmittance: Lanes<S>,
+    values: [Sum<S>; 3],
+    cutoff: Lanes<S>,
+    /// The greatest transmittance of a pixel that is done.
+    below_open: Lanes<S>,
+}
+
+impl<S: Simd> Pixels<S> {
+    /// What [`Picture::composite`] does.
+    #[inline(always)]
+    pub(crate) fn composite(&mut self, simd: S, fragments: &Fragments) {
+        let zero = Lanes::splat(simd, 0.0);
+        let tau = zero.where_less_or(self.transmittance, self.cutoff, Lanes::load(simd, &fragments.optical_depth[0]));
+        let weight = self.transmittance * tau.opacity();
+        self.optical_depth.add(tau);
+        self.transmittance = self.optical_depth.sum.exp_neg();
+        for c in 0..3 {
+            self.values[c].add(weight * Lanes::load(simd, &fragments.values[c]));
+        }
+    }
+
+    /// Whether nothing more is seen through any of them.
+    #[inline(always)]
+    pub(crate) fn are_done(&self) -> bool {
+        !self.below_open.any_less(self.transmittance)
+    }
 }
 
 impl Picture {
     /// The tile at `corner` as it is so far.
-    pub(crate) fn load(from: &Accumulator, corner: [usize; 2], params: &Params) -> Self {
+    #[inline(always)]
+    pub(crate) fn load<S: Simd>(simd: S, from: &Accumulator, corner: [usize; 2], params: &Params) -> Self {
         let planes = from.optical_depth.len();
         let channels = from.channels.len();
         let inside = [0, 1].map(|a| (from.size[a] as usize - corner[a]).min(TILE));
@@ -78,6 +112,7 @@ impl Picture {
             half: params.is_half(),
             open: [0; SIDE],
             lit: [0; SIDE],
+            is_changed: true,
         };
         for (image, at) in tile.rows(from.size[0]) {
             for (p, plane) in from.optical_depth.iter().enumerate() {
@@ -96,7 +131,7 @@ impl Picture {
                 tile.object[at..at + inside[0]].copy_from_slice(&from.object[image.clone()]);
             }
         }
-        tile.find_open();
+        tile.find_open(simd);
         tile
     }
 
@@ -130,17 +165,72 @@ impl Picture {
     }
 
     /// Finds the pixels that are still seen through.
-    pub(crate) fn find_open(&mut self) {
+    #[inline(always)]
+    pub(crate) fn find_open<S: Simd>(&mut self, simd: S) {
+        if !self.is_changed {
+            return;
+        }
+        self.is_changed = false;
+        let least = self.least_open();
         for y in 0..TILE {
             let mut bits = 0;
-            for x in 0..TILE {
-                let mut most = 0.0f32;
+            for x in (0..TILE).step_by(Lanes::<S>::COUNT) {
+                let mut most = Lanes::splat(simd, 0.0);
                 for p in 0..self.planes {
-                    most = most.max(self.transmittance[p * PIXELS + y * TILE + x]);
+                    most = most.max(Lanes::load(simd, &self.transmittance[p * PIXELS + y * TILE + x..]));
                 }
-                bits |= u64::from(most >= self.cutoff && most > 0.0) << (x + 1);
+                let mut of_lanes = (1 << Lanes::<S>::COUNT) - 1;
+                if most.any_less(Lanes::splat(simd, least)) {
+                    let mut through = [0.0; MAX_LANES];
+                    most.store(&mut through);
+                    let lanes = through[..Lanes::<S>::COUNT].iter().rev();
+                    of_lanes = lanes.fold(0, |bits, through| bits << 1 | u64::from(*through >= least));
+                }
+                bits |= of_lanes << (x + 1);
             }
             self.open[y + 1] = bits;
+        }
+    }
+
+    /// The least transmittance of a pixel that is seen through: what is not 0 is no less than a normal number.
+    fn least_open(&self) -> f32 {
+        self.cutoff.max(f32::MIN_POSITIVE)
+    }
+
+    /// Whether pixels are no more than [`Pixels`] have.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.planes == 1 && self.channels == 3 && self.depth.is_empty() && self.object.is_empty() && !self.half
+    }
+
+    /// The pixels from (x, y) on of a plain tile.
+    #[inline(always)]
+    pub(crate) fn pixels<S: Simd>(&self, simd: S, y: usize, x: usize) -> Pixels<S> {
+        let first = y * TILE + x;
+        let optical_depth = Sum::load(simd, &self.optical_depth[first..], &self.excess[first..]);
+        let mut values = [optical_depth; 3];
+        for c in 0..3 {
+            let at = c * PIXELS + first;
+            values[c] = Sum::load(simd, &self.values[at..], &self.value_excess[at..]);
+        }
+        Pixels {
+            optical_depth,
+            transmittance: Lanes::load(simd, &self.transmittance[first..]),
+            values,
+            cutoff: Lanes::splat(simd, self.cutoff),
+            below_open: Lanes::splat(simd, self.least_open().next_down()),
+        }
+    }
+
+    /// Takes them back.
+    #[inline(always)]
+    pub(crate) fn put<S: Simd>(&mut self, y: usize, x: usize, pixels: &Pixels<S>) {
+        let first = y * TILE + x;
+        self.is_changed = true;
+        pixels.optical_depth.store(&mut self.optical_depth[first..], &mut self.excess[first..]);
+        pixels.transmittance.store(&mut self.transmittance[first..]);
+        for c in 0..3 {
+            let at = c * PIXELS + first;
+            pixels.values[c].store(&mut self.values[at..], &mut self.value_excess[at..]);
         }
     }
 
@@ -165,6 +255,7 @@ impl Picture {
     #[inline(always)]
     pub(crate) fn composite<S: Simd>(&mut self, simd: S, y: usize, x: usize, fragments: &Fragments, origin: f64) {
         let first = y * TILE + x;
+        self.is_changed = true;
         let zero = Lanes::splat(simd, 0.0);
         let mut most = zero;
         for p in 0..self.planes {

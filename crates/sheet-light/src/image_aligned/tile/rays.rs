@@ -1,7 +1,9 @@
 //! The rays of one tile: where each enters and leaves a volume, how long it is per unit of view depth.
 
 use super::size::{AREA, SIDE, TILE};
+use crate::image_aligned::gather::{GROUP, GROUPS};
 use crate::image_aligned::slant::Slant;
+use crate::shared::depths::DepthRange;
 use crate::shared::lattice::rays::{LatticeRays, ViewRay};
 use crate::shared::pixel::Pixel;
 use crate::shared::slabs::Slabs;
@@ -17,6 +19,10 @@ use std::ops::Range;
 pub(crate) struct Crossings {
     pub(crate) near: Vec<f32>,
     pub(crate) far: Vec<f32>,
+    /// The nearest and the farthest of these of the neighbours that are read together, row by row; beyond each other where none is inside.
+    pub(crate) groups: Vec<DepthRange>,
+    /// Depths between which all of these are inside.
+    pub(crate) wholes: Vec<DepthRange>,
 }
 
 /// The rays of a tile with its rim: x and y per unit of view depth in perspective, or where they are if they are parallel.
@@ -107,7 +113,9 @@ impl Slopes {
 
 impl Crossings {
     pub(crate) fn new() -> Self {
-        Self { near: vec![0.0; AREA + MAX_LANES], far: vec![0.0; AREA + MAX_LANES] }
+        let depths = vec![0.0; AREA + MAX_LANES];
+        let groups = vec![DepthRange { near: 0.0, far: 0.0 }; SIDE * GROUPS];
+        Self { near: depths.clone(), far: depths, wholes: groups.clone(), groups }
     }
 
     /// The slabs between the nearest and the farthest place that any ray is inside at.
@@ -132,6 +140,17 @@ impl Crossings {
                 let crossing = rays.crossing(slopes.ray(x, y));
                 let [near, far] = crossing.map(|depth| slopes.slant.snapped(depth + offset, slabs));
                 (self.near[y * SIDE + x], self.far[y * SIDE + x]) = (near as f32, far as f32);
+            }
+        }
+        for (at, (group, whole)) in self.groups.iter_mut().zip(&mut self.wholes).enumerate() {
+            let first = at / GROUPS * SIDE + 1 + at % GROUPS * GROUP;
+            *group = DepthRange { near: f32::INFINITY, far: f32::NEG_INFINITY };
+            *whole = DepthRange { near: f32::NEG_INFINITY, far: f32::INFINITY };
+            for (near, far) in self.near[first..first + GROUP].iter().zip(&self.far[first..first + GROUP]) {
+                *whole = DepthRange { near: whole.near.max(*near), far: whole.far.min(*far) };
+                if near < far {
+                    *group = DepthRange { near: group.near.min(*near), far: group.far.max(*far) };
+                }
             }
         }
     }

@@ -48,6 +48,8 @@ pub(crate) struct Reconstructed<'a> {
     pub(crate) faces: DepthRange,
     /// Whether that is not the whole of its own slab.
     pub(crate) is_part: bool,
+    /// Whether each pixel has all of these depths, inside of the volume and within the limits.
+    pub(crate) is_whole: bool,
     /// Pixels that are seen through, from the first one on, a bit each.
     pub(crate) open: u32,
 }
@@ -89,18 +91,47 @@ impl Shader<'_> {
         if !Lanes::splat(simd, 0.0).any_less(medium.depth) {
             return;
         }
-        let is_first = !fragments.any;
-        fragments.any = true;
-        let mut values_beside_others = [[0.0; MAX_LANES]; MAX_CHANNELS];
-        let values = if is_first { &mut fragments.values } else { &mut values_beside_others };
-        let is_plain = reconstructed.prepared.volume.material.shading == Shading::Unlit && self.layout.count() == 3;
-        if is_plain {
+        let volume = &reconstructed.prepared.volume;
+        let extinction = volume.material.extinction_rgb;
+        if !fragments.any {
+            fragments.any = true;
+            self.values(simd, reconstructed, place, &medium, kept, &mut fragments.values);
+            for p in 0..picture.planes {
+                (medium.depth * Lanes::splat(simd, extinction[p])).store(&mut fragments.optical_depth[p]);
+            }
+            medium.near.store(&mut fragments.near);
+            medium.far.store(&mut fragments.far);
+            fragments.object = [volume.object; MAX_LANES];
+            return;
+        }
+        let mut shaded = Shaded { volume, tau: [0.0; MAX_LANES], values: [[0.0; MAX_LANES]; MAX_CHANNELS] };
+        self.values(simd, reconstructed, place, &medium, kept, &mut shaded.values);
+        medium.depth.store(&mut shaded.tau);
+        for p in 0..picture.planes {
+            let before = Lanes::load(simd, &fragments.optical_depth[p]);
+            (medium.depth * Lanes::splat(simd, extinction[p]) + before).store(&mut fragments.optical_depth[p]);
+        }
+        mix(simd, &shaded, &medium, fragments, picture);
+    }
+
+    /// All channels of a medium in neighbouring pixels.
+    #[inline(always)]
+    fn values<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        medium: &Medium<S>,
+        kept: &mut Kept,
+        values: &mut Values,
+    ) {
+        let material = reconstructed.prepared.volume.material;
+        if material.shading == Shading::Unlit && self.layout.count() == 3 {
             for c in 0..3 {
-                (medium.color[c] + Lanes::splat(simd, reconstructed.prepared.volume.material.emission[c]))
-                    .store(&mut values[c]);
+                (medium.color[c] + Lanes::splat(simd, material.emission[c])).store(&mut values[c]);
             }
         } else if !reconstructed.is_part {
-            self.light(simd, reconstructed, place, &medium, values);
+            self.light(simd, reconstructed, place, medium, values);
         } else {
             if kept.is_new(place) {
                 let whole = self.classify(simd, reconstructed, place, reconstructed.prepared.slabs.faces(place.slab));
@@ -108,31 +139,6 @@ impl Shader<'_> {
                 kept.keep::<S>(place, &values[..self.layout.count()]);
             }
             kept.recall::<S>(place, &mut values[..self.layout.count()]);
-        }
-        let mut tau = [0.0; MAX_LANES];
-        medium.depth.store(&mut tau);
-        let extinction = reconstructed.prepared.volume.material.extinction_rgb;
-        for p in 0..picture.planes {
-            let values_beside_others = Lanes::load(simd, &tau) * Lanes::splat(simd, extinction[p]);
-            let sum = if is_first {
-                values_beside_others
-            } else {
-                values_beside_others + Lanes::load(simd, &fragments.optical_depth[p])
-            };
-            sum.store(&mut fragments.optical_depth[p]);
-        }
-        if is_first {
-            medium.near.store(&mut fragments.near);
-            medium.far.store(&mut fragments.far);
-            fragments.object = [reconstructed.prepared.volume.object; MAX_LANES];
-        } else {
-            mix(
-                simd,
-                &Shaded { volume: &reconstructed.prepared.volume, tau, values: values_beside_others },
-                &medium,
-                fragments,
-                picture,
-            );
         }
     }
 
@@ -145,6 +151,35 @@ impl Shader<'_> {
         place: Place,
         faces: DepthRange,
     ) -> Medium<S> {
+        let [near, far] = if reconstructed.is_whole {
+            [Lanes::splat(simd, faces.near), Lanes::splat(simd, faces.far)]
+        } else {
+            self.ends(simd, reconstructed, place, faces)
+        };
+        let length = (far - near).max(Lanes::splat(simd, 0.0));
+        let [value, weight] = if reconstructed.is_whole {
+            reconstructed.sheets.load(simd, place.slab, place.y, place.x)
+        } else {
+            self.amid(simd, reconstructed, place)
+        };
+        let [extinction, red, green, blue] = match reconstructed.preclassified {
+            None => reconstructed.prepared.classifier.classify_seen(simd, value),
+            Some(classes) => classes.load(simd, place.slab, place.y, place.x),
+        };
+        let secant = self.secants(simd, place);
+        let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
+        Medium { near, far, depth, secant, color: [red, green, blue] }
+    }
+
+    /// The depths between two others within which each ray is inside of the volume and of the limits.
+    #[inline(always)]
+    fn ends<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        place: Place,
+        faces: DepthRange,
+    ) -> [Lanes<S>; 2] {
         let pixel = place.pixel();
         let limit = |depths: &[f32]| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]);
         let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..])
@@ -153,19 +188,10 @@ impl Shader<'_> {
         let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..])
             .min(limit(reconstructed.limits[1]))
             .min(Lanes::splat(simd, faces.far));
-        let [near, far] = match reconstructed.part {
+        match reconstructed.part {
             None => [near, far],
             Some(part) => [near.max(Lanes::load(simd, &part.from)), far.min(Lanes::load(simd, &part.to))],
-        };
-        let length = (far - near).max(Lanes::splat(simd, 0.0));
-        let [value, weight] = self.amid(simd, reconstructed, place);
-        let [extinction, red, green, blue] = match reconstructed.preclassified {
-            None => reconstructed.prepared.classifier.classify(simd, value),
-            Some(classes) => classes.load(simd, place.slab, place.y, place.x),
-        };
-        let secant = self.secants(simd, place);
-        let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
-        Medium { near, far, depth, secant, color: [red, green, blue] }
+        }
     }
 
     /// The value in the middle of what each ray has of slab and volume, and the kernels' sum. A sheet has that of the middle of its slab; where a

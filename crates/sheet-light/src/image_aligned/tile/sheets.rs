@@ -99,22 +99,25 @@ impl Sheets {
 
     /// The values of a row, to be filled.
     #[inline(always)]
-    pub(crate) fn begin_values(&mut self, slab: u32, y: usize) -> &mut [f32] {
+    pub(crate) fn row_mut(&mut self, slab: u32, y: usize) -> &mut [f32] {
         let index = Self::index(slab, y, 0);
         &mut self.values[index..index + SIDE]
     }
 
-    /// The pixels `bits` of a row have values now, and no others.
+    /// The pixels `tags` of a sheet, a bit each, have values now, and no others.
     #[inline(always)]
-    pub(crate) fn finish_row(&mut self, slab: u32, y: usize, bits: u64) {
-        let tags = &mut self.tags[(slab % KEPT) as usize][y];
-        if *tags | bits != 0 {
-            let index = Self::index(slab, y, 0);
-            for (x, weight) in self.weights[index..index + SIDE].iter_mut().enumerate() {
-                *weight = (bits >> x & 1) as f32;
+    pub(crate) fn finish(&mut self, slab: u32, tags: &[u64; SIDE]) {
+        let before = &mut self.tags[(slab % KEPT) as usize];
+        for (y, (before, tags)) in before.iter_mut().zip(tags).enumerate() {
+            // Weights are those of the sheet that was here before.
+            if before != tags {
+                let index = Self::index(slab, y, 0);
+                for (x, weight) in self.weights[index..index + SIDE].iter_mut().enumerate() {
+                    *weight = (tags >> x & 1) as f32;
+                }
+                *before = *tags;
             }
         }
-        *tags = bits;
     }
 
     /// Pixels of a row that may have a value.

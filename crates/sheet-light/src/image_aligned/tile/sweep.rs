@@ -24,7 +24,7 @@ use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
 /// Pixels of a row of a tile, without its rim.
-const INTERIOR: u64 = ((1 << TILE) - 1) << 1;
+pub(crate) const INTERIOR: u64 = ((1 << TILE) - 1) << 1;
 
 impl VolumeScratch {
     /// The volume's own slab at a slab, if any kernel reaches it.
@@ -104,11 +104,12 @@ impl FoldTile<'_> {
             axes: sheeted.input.camera.axes.map(|a| a.as_vec3()),
             lamps: &sheeted.lamps,
         };
+        let is_alone = self.is_alone(picture);
         let mut slab = span.start;
         let mut steps = 0;
         while slab < span.end {
             if self.needs_batch(slab) || steps % BATCH == 0 {
-                picture.find_open();
+                picture.find_open(simd);
                 picture.lit = picture.open;
                 if !self.opaque.is_empty() {
                     picture.close(&self.scratch.far, sheeted.slabs.face(slab));
@@ -120,15 +121,20 @@ impl FoldTile<'_> {
                 }
                 self.finish(simd, shader.slopes, slab, picture, counts);
             }
-            let end = self.next_face(slab, span.end);
-            self.shade(simd, &shader, slab..end, picture, counts);
+            let end = if is_alone { self.run_end(slab, span.end) } else { self.next_face(slab, span.end) };
+            if is_alone {
+                self.shade_run(simd, &shader, slab..end, picture, counts);
+                steps = 0;
+            } else {
+                self.shade(simd, &shader, slab..end, picture, counts);
+                steps += 1;
+            }
             slab = end;
-            steps += 1;
         }
     }
 
     /// Whether a sheet of this slab, or the one behind it, is not finished.
-    fn needs_batch(&self, slab: u32) -> bool {
+    pub(crate) fn needs_batch(&self, slab: u32) -> bool {
         self.sheeted.volumes.iter().zip(&self.scratch.volumes).any(|(prepared, scratch)| scratch.needs(prepared, slab))
     }
 
@@ -143,7 +149,7 @@ impl FoldTile<'_> {
     }
 
     /// Where what is there changes next: a face of a volume's own slabs, or the slab of a splat.
-    fn next_face(&self, slab: u32, end: u32) -> u32 {
+    pub(crate) fn next_face(&self, slab: u32, end: u32) -> u32 {
         let mut next = end;
         for (prepared, scratch) in self.sheeted.volumes.iter().zip(&self.scratch.volumes) {
             let slab_of_volume = slab / prepared.stride;
@@ -250,8 +256,19 @@ impl Between<'_, '_> {
             let is_part = part.is_none() && step.len() < prepared.stride as usize;
             let limits = [near, far];
             let preclassified = preclassified.as_deref();
-            let reconstructed =
-                Reconstructed { prepared, crossings, sheets, preclassified, limits, part, faces, is_part, open };
+            let is_whole = false;
+            let reconstructed = Reconstructed {
+                prepared,
+                crossings,
+                sheets,
+                preclassified,
+                limits,
+                part,
+                faces,
+                is_part,
+                is_whole,
+                open,
+            };
             shader.add(simd, &reconstructed, Place { slab, y, x }, picture, kept, fragments);
         }
         let inner = Pixel { x: x - 1, y: y - 1 };

@@ -8,14 +8,12 @@ use splat_core::glam::{DVec3, IVec3};
 /// Side of a brick, voxels.
 const SIDE: usize = 8;
 
-/// More bricks are not looked at one by one: one of them is taken to be seen.
-const MOST: i32 = 64;
-
-/// A flag a brick, of the lattice with its rim.
+/// Which bricks are seen, of the lattice with its rim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Bricks {
     dims: [usize; 3],
-    is_seen: Vec<bool>,
+    /// How many are seen of those before a corner of bricks along all axes, so that a block of any size takes eight of these.
+    seen_before: Vec<u32>,
 }
 
 /// Cells of the lattice, first and last along each axis.
@@ -50,37 +48,45 @@ impl Bricks {
                 .flat_map(|k| (first[1]..(first[1] + SIDE).min(ny)).map(move |j| (j, k)));
             rows.into_iter().any(|(j, k)| voxels.eight(first[0] / SIDE, j, k) != 0)
         };
-        let is_seen = (0..dims.iter().product()).into_par_iter().with_min_len(64).map(brick).collect();
-        Self { dims, is_seen }
+        let is_seen: Vec<bool> = (0..dims.iter().product()).into_par_iter().with_min_len(64).map(brick).collect();
+        let [sx, sy, sz] = dims.map(|n| n + 1);
+        let mut seen_before = vec![0u32; sx * sy * sz];
+        for (row, is_seen) in is_seen.chunks_exact(dims[0]).enumerate() {
+            let at = ((row / dims[1] + 1) * sy + row % dims[1] + 1) * sx;
+            let mut of_row = 0;
+            for (i, is_seen) in is_seen.iter().enumerate() {
+                of_row += u32::from(*is_seen);
+                let corner = at + i + 1;
+                // Those of the plane that are in both are counted once.
+                let of_plane = seen_before[corner - sx] + seen_before[corner - sx * sy];
+                seen_before[corner] = of_plane - seen_before[corner - sx * sy - sx] + of_row;
+            }
+        }
+        Self { dims, seen_before }
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.is_seen.len() as u64
+        size_of_val(&*self.seen_before) as u64
     }
 
     /// Whether any brick of the cells may be seen, the lattice going on as it does in its rim.
     #[inline(always)]
     pub(crate) fn is_any(&self, cells: &Box3) -> bool {
-        let mut low = [0usize; 3];
-        let mut high = [0usize; 3];
-        let mut count = 1;
+        let mut begin = [0usize; 3];
+        let mut end = [0usize; 3];
         for a in 0..3 {
             let last = self.dims[a] as i32 - 1;
             let brick = |cell: i32| (cell.saturating_add(RIM[a] as i32) >> 3).clamp(0, last);
-            (low[a], high[a]) = (brick(cells.low[a]) as usize, brick(cells.high[a]) as usize);
-            count *= (high[a] - low[a] + 1).min(MOST as usize);
+            begin[a] = brick(cells.low[a]) as usize;
+            end[a] = brick(cells.high[a]) as usize + 1;
         }
-        if count >= MOST as usize {
-            return true;
-        }
-        for k in low[2]..=high[2] {
-            for j in low[1]..=high[1] {
-                let row = (k * self.dims[1] + j) * self.dims[0];
-                if self.is_seen[row + low[0]..=row + high[0]].iter().any(|seen| *seen) {
-                    return true;
-                }
-            }
-        }
-        false
+        let stride = self.dims[0] + 1;
+        let plane = stride * (self.dims[1] + 1);
+        let in_row = |j: usize, k: usize| {
+            let row = &self.seen_before[k * plane + j * stride..][..stride];
+            row[end[0]].wrapping_sub(row[begin[0]])
+        };
+        let before = |k: usize| in_row(end[1], k).wrapping_sub(in_row(begin[1], k));
+        before(end[2]) != before(begin[2])
     }
 }

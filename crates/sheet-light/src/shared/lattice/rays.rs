@@ -23,6 +23,13 @@ impl ViewRay {
     }
 }
 
+/// A view ray in lattice coordinates: `start` + `along`·z, z the view depth that it has come from there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LatticeLine {
+    pub(crate) start: DVec3,
+    pub(crate) along: DVec3,
+}
+
 /// A volume's lattice coordinates of a view ray: origin + direction·z, and the planes that it is cut along.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LatticeRays {
@@ -65,10 +72,11 @@ impl LatticeRays {
         })
     }
 
-    /// Lattice coordinates of the place on a view ray at a depth that is counted from the origin.
+    /// A view ray in lattice coordinates, from the place on it at a depth that is counted from the origin.
     #[inline(always)]
-    pub(crate) fn place(&self, ray: ViewRay, depth: f64) -> DVec3 {
-        self.lattice(ray.from + ray.along * (self.origin + depth))
+    pub(crate) fn line(&self, ray: ViewRay, depth: f64) -> LatticeLine {
+        let start = self.lattice(ray.from + ray.along * (self.origin + depth));
+        LatticeLine { start, along: self.lattice_from_view * ray.along }
     }
 
     /// Lattice coordinates of a view position.
