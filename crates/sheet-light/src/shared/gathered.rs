@@ -14,11 +14,9 @@ use crate::shared::classifier::Base;
 use crate::shared::lattice::Lattice;
 use crate::shared::lattice::near::Near;
 use crate::shared::params::GatherKernel;
-use crate::shared::value_range::ValueRange;
 use crate::shared::vectors::NATURAL;
 use crate::shared::voxels::{Voxels, without_extinction};
 use bricks::{Box3, Bricks};
-use rayon::prelude::*;
 use splat_core::raster::lanes::{Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::{Grid, Packing, TransferFunction};
@@ -73,13 +71,11 @@ impl<'a> Gathered<'a> {
         let grid = volume.grid;
         let hidden = without_extinction(transfer);
         let dims = grid.dims;
-        let seen = |values: &[f32], hidden: &[ValueRange]| {
-            Voxels::needed(&Lattice::over(values, dims, Packing::Cartesian, RIM), hidden, near)
-        };
         let last = |stored: [usize; 3], behind: usize| stored.map(|n| (n - 1 - behind) as i32);
         match kernel {
             GatherKernel::Linear => {
-                let voxels = seen(&grid.values, &hidden);
+                let lattice = Lattice::over(&grid.values, dims, Packing::Cartesian, RIM);
+                let voxels = Voxels::needed(&lattice, &hidden, near);
                 let stored = dims.map(|n| n.max(2));
                 // A lattice goes on beyond its faces as its outermost cells do. Of a single plane there are two, so that it has cells.
                 let values = if stored == dims { Cow::Borrowed(&grid.values[..]) } else { Cow::Owned(doubled(grid)) };
@@ -89,15 +85,15 @@ impl<'a> Gathered<'a> {
             }
             GatherKernel::Gaussian => {
                 let hidden: Vec<_> = hidden.iter().map(|range| range.relative_to(base)).collect();
-                let coefficients = filter::coefficients(grid, base);
-                let voxels = seen(&coefficients, &hidden);
-                let lattice = Lattice::over(&coefficients, dims, Packing::Cartesian, RIM);
-                let values = with_rim(&lattice);
-                let cells = [[1; 3], last(lattice.dims, 2)];
+                let before = RIM[0];
+                let stored = dims.map(|n| n + 2 * before);
+                let values = filter::coefficients(grid, base, before);
+                let lattice = Lattice::over(&values, stored, Packing::Cartesian, [0; 3]);
+                let voxels = Voxels::needed(&lattice, &hidden, near);
                 let bricks = Bricks::new(&voxels);
-                let stored = lattice.dims;
-                let relative = Relative::NONE;
-                (Self { kernel, values: Cow::Owned(values), stored, before: RIM[0], cells, relative, bricks }, voxels)
+                let cells = [[1; 3], last(stored, 2)];
+                let values = Cow::Owned(values);
+                (Self { kernel, values, stored, before, cells, relative: Relative::NONE, bricks }, voxels)
             }
         }
     }
@@ -278,17 +274,6 @@ impl Corner {
     pub(crate) fn from(&self, a: usize, place: f64) -> f64 {
         place + self.before - f64::from(self.cell[a])
     }
-}
-
-/// The values of a lattice with its rim.
-fn with_rim(lattice: &Lattice<'_>) -> Vec<f32> {
-    let [nx, ny, nz] = lattice.dims;
-    let mut values = vec![0.0; nx * ny * nz];
-    values.par_chunks_mut(nx).enumerate().with_min_len(64).for_each_init(Vec::new, |row, (at, out)| {
-        lattice.row(at % ny, at / ny, row);
-        out.copy_from_slice(row);
-    });
-    values
 }
 
 /// The values of a grid, each plane of an axis that has one alone twice.

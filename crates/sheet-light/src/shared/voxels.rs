@@ -124,14 +124,29 @@ impl Voxels {
         let mut bits = vec![0u64; words * dims[1] * dims[2]];
         let rows = bits.par_chunks_mut(words).enumerate().with_min_len(256);
         rows.for_each_init(Vec::new, |values: &mut Vec<f32>, (row, bits)| {
-            lattice.row(row % dims[1], row / dims[1], values);
-            for (word, values) in bits.iter_mut().zip(values.chunks(64)) {
-                let mut is = [1u8; 64];
-                // What lies outside hides nothing.
-                is.iter_mut().zip(values).for_each(|(is, v)| *is = u8::from((*v >= low) & (*v <= high)));
-                // The lowest bits of eight bytes, beside each other.
-                let bits = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-                *word = is.as_chunks().0.iter().rev().fold(0, |word, eight| word << 8 | bits(eight));
+            let [j, k] = [row % dims[1], row / dims[1]];
+            let inside = lattice.rim[0]..dims[0] - lattice.rim[0];
+            if lattice.inside(inside.clone(), j, k).is_none() {
+                lattice.row(j, k, values);
+                let words = bits.iter_mut().zip(values.chunks(64));
+                words.for_each(|(word, values)| *word = bits_within(values, low, high));
+                return;
+            }
+            for (w, word) in bits.iter_mut().enumerate() {
+                let first = 64 * w;
+                if let Some(values) = lattice.inside(first..first + 64, j, k) {
+                    *word = bits_within(values, low, high);
+                    continue;
+                }
+                let range = first..(first + 64).min(dims[0]);
+                let [from, to] = [inside.start, inside.end].map(|i| i.clamp(range.start, range.end));
+                let mut values = [0.0; 64];
+                if let Some(inside) = lattice.inside(from..to, j, k) {
+                    values[from - first..to - first].copy_from_slice(inside);
+                }
+                (first..from).chain(to..range.end).for_each(|i| values[i - first] = lattice.value(i, j, k));
+                // What lies behind the row hides nothing.
+                *word = bits_within(&values[..range.len()], low, high);
             }
         });
         Self { dims, words, bits }
@@ -217,6 +232,17 @@ impl Voxels {
         let old = self.bits.clone();
         along(&mut self.bits, &old, plane, nz, reach[2]);
     }
+}
+
+/// Which of up to 64 values lie within two others, a bit each.
+#[inline(always)]
+fn bits_within(values: &[f32], low: f32, high: f32) -> u64 {
+    let mut is = [1u8; 64];
+    // What lies outside hides nothing.
+    is.iter_mut().zip(values).for_each(|(is, v)| *is = u8::from((*v >= low) & (*v <= high)));
+    // The lowest bits of eight bytes, beside each other.
+    let bits = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+    is.as_chunks().0.iter().rev().fold(0, |word, eight| word << 8 | bits(eight))
 }
 
 /// The word that begins `step` bits behind the beginning of a row.

@@ -59,7 +59,11 @@ impl Grid {
         if !(volume.is_finite() && volume > 0.0 && self.origin.is_finite()) {
             return Err(Error::invalid("grid", 0, "axes", self.axes, "three finite steps that span space"));
         }
-        if let Some(i) = self.values.iter().position(|v| !v.is_finite()) {
+        // Some at once, so that vectors are compared.
+        let are_finite = |some: &[f32]| some.iter().fold(true, |are, v| are & v.is_finite());
+        if !self.values.chunks(256).all(are_finite)
+            && let Some(i) = self.values.iter().position(|v| !v.is_finite())
+        {
             return Err(Error::invalid("voxel", i, "value", self.values[i], "a finite number"));
         }
         Ok(())

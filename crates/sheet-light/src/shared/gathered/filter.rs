@@ -88,8 +88,9 @@ pub(crate) fn taps(shape: &KernelShape) -> [f64; TAPS + 1] {
     [1.0 - 2.0 * (first + second + third), first, second, third]
 }
 
-/// The filtered values of a lattice, relative to a base. A lattice goes on beyond its faces as 2·v(0) − v(m), and so do its coefficients.
-pub(crate) fn coefficients(grid: &Grid, base: Base) -> Vec<f32> {
+/// The filtered values of a lattice, relative to a base, with `rim` of them before and behind it along each axis. A lattice goes on beyond its faces as
+/// 2·v(0) − v(m), and so do its coefficients.
+pub(crate) fn coefficients(grid: &Grid, base: Base, rim: usize) -> Vec<f32> {
     let taps = taps(&KernelShape::default()).map(|tap| tap as f32);
     let [nx, ny, nz] = grid.dims;
     let plane = nx * ny;
@@ -101,10 +102,7 @@ pub(crate) fn coefficients(grid: &Grid, base: Base) -> Vec<f32> {
         let mut padded = vec![0.0; nx + 2 * TAPS];
         for (out, values) in rows.chunks_exact_mut(nx).zip(values.chunks_exact(nx)) {
             padded[TAPS..TAPS + nx].iter_mut().zip(values).for_each(|(to, from)| *to = base.relative(*from));
-            for m in 1..=TAPS {
-                padded[TAPS - m] = 2.0 * padded[TAPS] - padded[TAPS + m.min(nx - 1)];
-                padded[TAPS + nx - 1 + m] = 2.0 * padded[TAPS + nx - 1] - padded[TAPS + nx - 1 - m.min(nx - 1)];
-            }
+            go_on(&mut padded, TAPS, 1);
             for (i, out) in out.iter_mut().enumerate() {
                 let middle = padded[TAPS + i];
                 // Differences, so that constants stay what they are.
@@ -117,19 +115,52 @@ pub(crate) fn coefficients(grid: &Grid, base: Base) -> Vec<f32> {
             filter_rows(&taps, j, ny, row, out);
         }
     });
-    let mut through = vec![0.0f32; plane * nz];
-    through.par_chunks_mut(nx).enumerate().with_min_len(16).for_each(|(at, out)| {
-        let j = at % ny;
-        let row = |k: usize| &across[(k * ny + j) * nx..][..nx];
-        filter_rows(&taps, at / ny, nz, row, out);
+    let stride = nx + 2 * rim;
+    let stored = stride * (ny + 2 * rim);
+    let mut through = vec![0.0f32; stored * (nz + 2 * rim)];
+    let inner = &mut through[rim * stored..(rim + nz) * stored];
+    inner.par_chunks_exact_mut(stored).enumerate().for_each(|(k, out)| {
+        for (j, out) in out.chunks_exact_mut(stride).skip(rim).take(ny).enumerate() {
+            let row = |k: usize| &across[(k * ny + j) * nx..][..nx];
+            filter_rows(&taps, k, nz, row, &mut out[rim..rim + nx]);
+            go_on(out, rim, 1);
+        }
+        go_on(out, rim, stride);
     });
+    go_on(&mut through, rim, stored);
     through
+}
+
+/// Lets what lies in the middle go on in `rim` pieces of `size` before and behind it.
+fn go_on(values: &mut [f32], rim: usize, size: usize) {
+    let count = values.len() / size - 2 * rim;
+    let last = rim + count - 1;
+    for m in 1..=rim {
+        let mirrored = m.min(count - 1);
+        for n in 0..size {
+            values[(rim - m) * size + n] = 2.0 * values[rim * size + n] - values[(rim + mirrored) * size + n];
+            values[(last + m) * size + n] = 2.0 * values[last * size + n] - values[(last - mirrored) * size + n];
+        }
+    }
 }
 
 /// Filters row `at` of `count`, across them.
 fn filter_rows<'a>(taps: &[f32; TAPS + 1], at: usize, count: usize, row: impl Fn(usize) -> &'a [f32], out: &mut [f32]) {
     let last = count - 1;
     let middle = row(at);
+    if at >= TAPS && at + TAPS <= last {
+        let beside = [1, 1, 2, 2, 3, 3];
+        let rows = [at - 1, at + 1, at - 2, at + 2, at - 3, at + 3].map(|at| &row(at)[..out.len()]);
+        let middle = &middle[..out.len()];
+        for i in 0..out.len() {
+            let mut sum = middle[i];
+            for n in 0..2 * TAPS {
+                sum += taps[beside[n]] * (rows[n][i] - middle[i]);
+            }
+            out[i] = sum;
+        }
+        return;
+    }
     out.copy_from_slice(middle);
     for m in 1..=TAPS {
         let tap = taps[m];

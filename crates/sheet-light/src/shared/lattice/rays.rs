@@ -110,8 +110,10 @@ impl LatticeRays {
                 }
                 continue;
             }
-            let one = to_low / along[a];
-            let other = to_high / along[a];
+            // Divisions are most of what a ray takes.
+            let per_step = 1.0 / along[a];
+            let one = to_low * per_step;
+            let other = to_high * per_step;
             (near, far) = (near.max(one.min(other)), far.min(one.max(other)));
         }
         [near - self.origin, far - self.origin]
