@@ -192,10 +192,17 @@ impl SheetLines<'_> {
     #[inline(always)]
     fn inside(&self, first: u32, y: usize, group: usize) -> Range<u32> {
         let DepthRange { near, far } = self.crossings.groups[y * GROUPS + group];
-        let is_inside =
-            |slab: u32| near < self.slabs.face(first + slab + 2) && far > self.slabs.face((first + slab).max(1) - 1);
-        let begin = (0..BATCH).find(|slab| is_inside(*slab)).unwrap_or(BATCH);
-        begin..(begin..BATCH).find(|slab| !is_inside(*slab)).unwrap_or(BATCH)
+        let mut begin = BATCH;
+        let mut end = 0;
+        for slab in 0..BATCH {
+            let before = self.slabs.face((first + slab).max(1) - 1);
+            let behind = self.slabs.face(first + slab + 2);
+            if near < behind && far > before {
+                begin = begin.min(slab);
+                end = slab + 1;
+            }
+        }
+        begin..end
     }
 
     /// The cells of some pixels of some rows in a batch, and all between them.
@@ -210,7 +217,8 @@ impl SheetLines<'_> {
     fn ribbon(&self, first: u32, y: usize) -> Ribbon {
         let depth = (f64::from(first) + 0.5) * self.slabs.width;
         let pixels = (SIDE - 1) as f64;
-        let [left, right] = [0, SIDE - 1].map(|x| self.rays.line(self.slopes.ray(x, y), depth));
+        let left = self.rays.line(self.slopes.ray(0, y), depth);
+        let right = self.rays.line(self.slopes.ray(SIDE - 1, y), depth);
         let across = (right.start - left.start) / pixels;
         let behind = left.along * self.slabs.width;
         let wider = (right.along - left.along) * (self.slabs.width / pixels);

@@ -50,6 +50,10 @@ impl FoldTile<'_> {
             DepthRange { near: f32::INFINITY, far: f32::NEG_INFINITY }
         };
         let slabs = slabs.start.max(active.start)..slabs.end.min(active.end);
+        let mut faces = [DepthRange { near: 0.0, far: 0.0 }; BATCH as usize];
+        for (faces, slab) in faces.iter_mut().zip(slabs.clone()) {
+            *faces = prepared.slabs.faces(slab);
+        }
         for y in 1..=TILE {
             let mut tags = 0;
             for slab in slabs.clone() {
@@ -67,12 +71,11 @@ impl FoldTile<'_> {
                 let open = (picture.open[y] >> x) as u32;
                 let inside = crossings.wholes[y * GROUPS + (x - 1) / GROUP];
                 let whole = DepthRange { near: inside.near.max(limits.near), far: inside.far.min(limits.far) };
-                for slab in slabs.clone() {
+                for (slab, faces) in slabs.clone().zip(faces) {
                     if sheets.tags(slab, y) & bits == 0 {
                         continue;
                     }
                     counts.shaded += Lanes::<S>::COUNT as u64;
-                    let faces = prepared.slabs.faces(slab);
                     let is_whole = whole.near <= faces.near && faces.far <= whole.far;
                     let reconstructed = Reconstructed {
                         prepared,

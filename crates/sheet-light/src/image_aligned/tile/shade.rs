@@ -181,12 +181,13 @@ impl Shader<'_> {
         faces: DepthRange,
     ) -> [Lanes<S>; 2] {
         let pixel = place.pixel();
-        let limit = |depths: &[f32]| Lanes::load(simd, &depths[(place.y - 1) * TILE + place.x - 1..]);
+        // Without the rim.
+        let inner = (place.y - 1) * TILE + place.x - 1;
         let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..])
-            .max(limit(reconstructed.limits[0]))
+            .max(Lanes::load(simd, &reconstructed.limits[0][inner..]))
             .max(Lanes::splat(simd, faces.near));
         let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..])
-            .min(limit(reconstructed.limits[1]))
+            .min(Lanes::load(simd, &reconstructed.limits[1][inner..]))
             .min(Lanes::splat(simd, faces.far));
         match reconstructed.part {
             None => [near, far],
