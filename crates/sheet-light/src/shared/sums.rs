@@ -55,11 +55,15 @@ impl<S: Simd> Sum<S> {
         self.excess.store(excess);
     }
 
+    /// A sum to which nothing is added stays as it is: how many pixels are looked at together, some of which get nothing, changes no bit.
     #[inline(always)]
     pub(crate) fn add(&mut self, term: Lanes<S>) {
+        let size = term.abs();
+        let zero = size - size;
         let term = term - self.excess;
         let new = self.sum + term;
-        self.excess = (new - self.sum) - term;
-        self.sum = new;
+        let excess = (new - self.sum) - term;
+        self.excess = excess.where_less_or(zero, size, self.excess);
+        self.sum = new.where_less_or(zero, size, self.sum);
     }
 }
