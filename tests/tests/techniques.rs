@@ -1,6 +1,7 @@
 //! Several techniques in one picture, and the exact one.
 
-use organza_tests::{draw, organza, parallel_view, window};
+use crate::view::FOG;
+use organza_tests::{Place, SMALL_SCENE, draw, organza, parallel_view, window};
 
 /// Fog, a pane of glass across it and a slab behind or around it, each by a technique of its own.
 fn three(order: [usize; 3], apart: f64) -> String {
@@ -107,4 +108,17 @@ fn a_technique_that_is_not_there_is_refused_where_it_is_named() {
     let refused =
         refusal(&text.replace("antialias = 1", "antialias = 1\ntechnique = 'particles'\nlayers = ['std_error']"));
     assert!(refused.contains("a picture by several techniques has no layer `std_error`"), "{refused}");
+}
+
+#[test]
+fn a_picture_of_one_pixel_is_drawn_by_every_technique() {
+    let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
+    for technique in ["points", "particles", "sheets", "surfels", "reference"] {
+        let arguments = ["render", "s.toml", "-o", "one.png", "--size", "1x1", "--technique", technique, "--force"];
+        // A medium is no surface.
+        let visible = format!("object.fog.visible={}", technique != "surfels");
+        let more = ["--set", "render.antialias=1", "--set", &visible, "--repeat-level", "4"];
+        place.expect(0, &[&arguments[..], &more].concat(), "");
+        assert_eq!(place.pixels("one.png").width(), 1);
+    }
 }

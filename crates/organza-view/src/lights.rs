@@ -90,6 +90,10 @@ impl LightChange {
             (None, _) => {}
         }
         if let Some(shadow) = self.shadow {
+            if !shadow && light.shadow_cells.is_some() {
+                // A light without a shadow has no cells.
+                keys.push(("shadow_cells", String::new()));
+            }
             keys.push(("shadow", shadow.to_string()));
         }
         keys

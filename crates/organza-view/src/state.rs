@@ -562,6 +562,21 @@ mod tests {
     }
 
     #[test]
+    fn a_shadow_with_cells_of_its_own_is_switched_off_and_on() {
+        let text = SCENE.replace("name = \"sun\"", "name = \"sun\"\nshadow_cells = 128");
+        let Opening { file, text, load, .. } = Opening::of_text("a.toml", text, RenderOptions::default());
+        let source = Source { file, text, load };
+        let scene = source.scene(Vec::new()).unwrap();
+        let mut state = State::default();
+        let first = Viewpoint::of_scene(&scene);
+        for (shadow, cells) in [(false, None), (true, Some(128))] {
+            state.apply(&Event::LightShadow { light: "sun".into(), shadow }, &scene, &first).unwrap();
+            let changed = source.scene(source.overrides(&state, &scene).unwrap()).unwrap();
+            assert_eq!((changed.lights[0].shadow, changed.lights[0].shadow_cells), (shadow, cells));
+        }
+    }
+
+    #[test]
     fn a_layer_is_kept_beside_those_of_the_scene() {
         let scene = after(&[Event::Layer { layer: Some("normal".into()) }]).unwrap();
         assert_eq!(scene.render.layers.names().collect::<Vec<_>>(), ["normal"]);

@@ -94,9 +94,10 @@ impl Loaded {
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
 
-    /// A box around all splats and objects, world units; empty where there is nothing.
-    pub(crate) fn bounds(&self) -> DAabb {
-        let DAabb { min, max } = normalize::bounds(&self.cloud, &self.own);
+    /// A box around all objects and splats, those too that were put aside, world units; empty where there is nothing.
+    pub(crate) fn bounds(&self, aside: Option<&Everything>) -> DAabb {
+        let cloud = aside.map_or(&self.cloud, |everything| &everything.cloud);
+        let DAabb { min, max } = normalize::bounds(cloud, &self.own);
         let scale = libm::exp2(f64::from(self.exponent));
         DAabb::new(min * scale, max * scale)
     }

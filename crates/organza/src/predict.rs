@@ -337,7 +337,7 @@ fn preferred(frame: &Frame<'_>, seen: &Seen) -> Option<Change> {
         converted.push(Count::new(Item::of_conversion(loaded.splats[rank].conversion), number));
         let extent = Extent::new(&native.world_box(), &frame.camera);
         let radius = native.radius * extent.samples_per_unit;
-        let footprint = (std::f64::consts::PI * radius * radius).clamp(4.0, samples(scene));
+        let footprint = (std::f64::consts::PI * radius * radius).max(4.0).min(samples(scene));
         let fragments = number * extent.share * footprint;
         splats = sum(splats, Expected { splats: number, fragments });
     }

@@ -129,9 +129,10 @@ impl Left {
         }
     }
 
-    /// A box around all that the last frame was made of, world units.
+    /// A box around all that the last frame was made of, cut away or not, world units.
     pub(crate) fn bounds(&self) -> Option<DAabb> {
-        Some(self.made.as_ref()?.loaded.bounds())
+        let Made { loaded, uncut, .. } = self.made.as_ref()?;
+        Some(loaded.bounds(uncut.as_ref().map(|uncut| &uncut.everything)))
     }
 
     /// Share of the allowed memory that files may take, and light that is remembered.

@@ -195,6 +195,28 @@ fn a_broken_scene_is_told_and_a_mended_one_is_drawn() {
 }
 
 #[test]
+fn a_file_that_changes_under_a_cut_that_leaves_nothing_leaves_the_page_alive() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let cuts = r#"[{"do": "cuts", "cuts": [{"object": null, "normal": [0, 0, 1], "point": [0, 0, -1000]}]}]"#;
+    place.write("events.json", cuts);
+    let view = View::start(&place, &["s.toml", "--watch", "--play", "events.json"]);
+    let mut page = opened(&view);
+    let nothing = page.value(PICTURE);
+    page.value("at('cuts-panel').open = true");
+    place.write("s.toml", format!("{SMALL_SCENE}{FOG}# again\n"));
+    page.wait_for("shown.generation > 1");
+    page.wait_for(WHOLE);
+    page.call("Page.reload", serde_json::json!({}));
+    page.wait_for(WHOLE);
+    assert_eq!(page.value("isOpen && !at('width').disabled && at('width').value > 0"), true);
+    page.value("at('cuts-panel').open = true, cutRows[0].item.querySelectorAll('button')[1].click()");
+    page.wait_for("shown.cuts.length === 0");
+    page.wait_for(WHOLE);
+    assert_ne!(page.value(PICTURE), nothing);
+    ends_well(&page, view);
+}
+
+#[test]
 fn the_page_fits_a_screen_and_a_phone_and_is_used_by_keys() {
     let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
     let view = View::start(&place, &["s.toml"]);

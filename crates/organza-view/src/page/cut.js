@@ -8,8 +8,11 @@ const along = (place, direction, length) => place.map((number, k) => number + le
 const unit = (vector) => vector.map((number) => number / Math.hypot(...vector));
 /// A number to a step that a hand can tell apart in what there is, without the sign of nothing.
 function rounded(number) {
+  // Before anything was drawn nobody knows how large it is.
+  if (!shown.bounds) return number;
   const [low, high] = shown.bounds;
   const step = 10 ** Math.floor(Math.log10(Math.hypot(...along(high, low, -1)) / 2000));
+  if (!(step > 0)) return number;
   return Number((Math.round(number / step) * step).toPrecision(12)) + 0;
 }
 
@@ -42,13 +45,21 @@ function moved(cut, position) {
 
 const towardsEye = () => cross(shown.viewpoint.right, shown.viewpoint.up);
 
-/// A cut through the middle, along the axis that leads to the eye most.
+/// A cut through what the view turns around, across the axis that leads to the eye most, of those that no other cut is across.
 function newCut() {
   const eye = towardsEye();
-  const axis = eye.map(Math.abs).reduce((best, size, k, sizes) => (size > sizes[best] ? k : best), 0);
+  const isTaken = (k) => cuts.some((cut) => axisOf(cut.normal) === "xyz"[k]);
+  const free = [0, 1, 2].filter((k) => !isTaken(k));
+  const axis = (free.length > 0 ? free : [0, 1, 2]).reduce((best, k) => (Math.abs(eye[k]) > Math.abs(eye[best]) ? k : best));
   const normal = [0, 0, 0];
   normal[axis] = Math.sign(eye[axis]) || 1;
-  return { object: null, normal, point: reach(normal).middle.map(rounded) };
+  return { object: null, normal, point: middleOfView() };
+}
+
+/// The place that the view turns around, within what there is.
+function middleOfView() {
+  const [low, high] = shown.bounds;
+  return shown.viewpoint.centre.map((number, k) => rounded(Math.min(high[k], Math.max(low[k], number))));
 }
 
 /// The word for a direction; nothing where it is no axis.
@@ -74,14 +85,14 @@ function makeCut(index) {
   row.axis.addEventListener("change", () => {
     const normal = AXES[row.axis.value] || towardsEye().map((number) => Number(number.toFixed(4)) + 0);
     const away = dot(normal, towardsEye()) < 0 ? -1 : 1;
-    changeCut(index, (cut) => ({ ...cut, normal: normal.map((number) => away * number + 0), point: reach(normal).middle.map(rounded) }));
+    changeCut(index, (cut) => ({ ...cut, normal: normal.map((number) => away * number + 0), point: middleOfView() }));
   });
   const button = (text, title, act) => {
     const made = element("button", { type: "button", textContent: text, title, "aria-label": label(title) });
     made.addEventListener("click", act);
     return made;
   };
-  const flip = button("Flip", "Keep the other side", () => changeCut(index, (cut) => ({ ...cut, normal: cut.normal.map((number) => 0 - number) })));
+  const flip = button("Flip", "Take the other side away", () => changeCut(index, (cut) => ({ ...cut, normal: cut.normal.map((number) => 0 - number) })));
   const remove = button("×", "Remove", () => {
     chosenCut = Math.max(0, index - 1);
     setCuts(cuts.filter((_, k) => k !== index));
@@ -91,7 +102,10 @@ function makeCut(index) {
   row.slider.addEventListener("input", () => changeCut(index, (cut) => moved(cut, signOf(cut) * Number(row.slider.value))));
   row.number = element("input", { type: "number", step: "any", "aria-label": label("Position, world units,") });
   row.number.addEventListener("change", () => {
-    if (row.number.value !== "") changeCut(index, (cut) => moved(cut, signOf(cut) * Number(row.number.value)));
+    const number = Number(row.number.value);
+    if (row.number.value !== "" && Math.abs(number) <= 1e18) changeCut(index, (cut) => moved(cut, signOf(cut) * number));
+    row.number.blur();
+    fillCuts();
   });
   row.item = element("li", { className: "cut" }, [row.object, row.axis, flip, remove, row.slider, row.number]);
   row.item.addEventListener("focusin", () => {
@@ -112,6 +126,7 @@ function fillCuts() {
   chosenCut = Math.min(chosenCut, Math.max(0, cuts.length - 1));
   cuts.forEach((cut, index) => {
     const row = cutRows[index];
+    row.number.disabled = row.slider.disabled = row.axis.disabled = !shown.bounds;
     const isHeld = (input) => document.activeElement === input;
     const normal = unit(cut.normal).map((number) => signOf(cut) * number);
     row.object.value = cut.object || "";
@@ -150,7 +165,10 @@ function onStage(place) {
 function outline(cut) {
   const [low, high] = shown.bounds;
   const normal = unit(cut.normal);
-  const position = dot(normal, cut.point);
+  const { from, to } = reach(normal);
+  // At its ends a plane only touches what there is.
+  const inset = 1e-6 * (to - from);
+  const position = Math.min(to - inset, Math.max(from + inset, dot(normal, cut.point)));
   const corner = (bits) => low.map((number, k) => ((bits >> k) & 1 ? high[k] : number));
   const found = [];
   for (let bits = 0; bits < 8; bits += 1) {

@@ -200,6 +200,17 @@ let lastLook = 0;
 /// Where the cursor of the keyboard is, shares of the picture.
 let cursor = null;
 
+/// How often values that are not known yet are asked for again.
+const PATIENT = 60;
+let unknown = 0;
+
+/// Looks below the pointer again, or below the cursor: the view has changed.
+function lookAgain() {
+  const place = cursor || (pointer && pictureBelow(pointer));
+  unknown = 0;
+  if (place) lookBelow(place, false);
+}
+
 /// Looks below a place of the picture; of several in a short time the last.
 function lookBelow(place, isSaid) {
   isWaiting = { place, isSaid };
@@ -220,7 +231,11 @@ function lookBelow(place, isSaid) {
 async function lookOnce(place, isSaid) {
   try {
     const answer = await fetch(`below?client=${client}&right=${place.right.toFixed(6)}&down=${place.down.toFixed(6)}`);
-    const text = answer.status === 200 ? belowText(await answer.json()) : "Values of this view are not known yet";
+    const isKnown = answer.status === 200;
+    const text = isKnown ? belowText(await answer.json()) : "Values of this view are not known yet";
+    // They come with its coarse picture.
+    if (isKnown) unknown = 0;
+    else if (!isWaiting && (unknown += 1) < PATIENT) isWaiting = { place, isSaid };
     at("below-text").textContent = text;
     if (isSaid) at("below-said").textContent = text;
   } catch {
@@ -231,7 +246,7 @@ async function lookOnce(place, isSaid) {
 function belowText(below) {
   const words = [];
   if (below.object !== null) words.push(below.object);
-  if (below.position) words.push(`at ${below.position.map(short).join(", ")}`, `depth ${short(below.depth)}`);
+  if (below.position) words.push(`at ${below.position.map(rounded).join(", ")}`, `depth ${short(below.depth)}`);
   else words.push("nothing that hides what lies behind it");
   for (const { name, value, meaning } of below.values) words.push(`${name} ${short(value)}${meaning ? ` ${meaning}` : ""}`);
   if (below.numbers.length > 0) {

@@ -69,6 +69,7 @@ async function follow(path, after, take) {
       const answer = await fetch(`${path}?client=${client}&after=${after()}`);
       if ([403, 409, 410].includes(answer.status)) {
         trouble(sentence(await answer.json()));
+        at("waiting").textContent = "";
         isOpen = false;
         return;
       }
@@ -119,6 +120,7 @@ async function takePicture(answer) {
   at("waiting").hidden = true;
   if (shown) showMark(shown);
   placeDivider();
+  lookAgain();
 }
 
 /// Says of a picture that is not the whole one of the present state what it is.
@@ -642,6 +644,7 @@ at("exposure").addEventListener("input", () => add({ do: "exposure", stops: Numb
 
 function setSize(width, height) {
   if (width >= 1 && height >= 1) add({ do: "size", width: Math.round(width), height: Math.round(height) });
+  else if (shown) for (const side of ["width", "height"]) at(side).value = shown.size[side];
 }
 for (const side of ["width", "height"]) {
   at(side).addEventListener("change", () => setSize(Number(at("width").value), Number(at("height").value)));

@@ -82,7 +82,7 @@ impl Sequence {
         &self.left.files
     }
 
-    /// A box around all that the last frame was made of, in view or not, world units; `None` where it was made of nothing.
+    /// A box around all that the last frame was made of, in view or not and cut away from a preview or not, world units; `None` where it was made of nothing.
     pub fn bounds(&self) -> Option<DAabb> {
         self.left.bounds().filter(|bounds| !bounds.is_empty())
     }

@@ -31,7 +31,7 @@ pub(crate) fn add<S: Simd>(simd: S, sums: &mut [f32], excess: &mut [f32], term: 
         return new;
     }
     let mut exact = Sum::load(simd, sums, excess);
-    exact.add(term);
+    exact.add(simd, term);
     exact.store(sums, excess);
     exact.sum
 }
@@ -57,9 +57,9 @@ impl<S: Simd> Sum<S> {
 
     /// A sum to which nothing is added stays as it is: how many pixels are looked at together, some of which get nothing, changes no bit.
     #[inline(always)]
-    pub(crate) fn add(&mut self, term: Lanes<S>) {
+    pub(crate) fn add(&mut self, simd: S, term: Lanes<S>) {
         let size = term.abs();
-        let zero = size - size;
+        let zero = Lanes::splat(simd, 0.0);
         let term = term - self.excess;
         let new = self.sum + term;
         let excess = (new - self.sum) - term;

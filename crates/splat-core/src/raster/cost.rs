@@ -84,7 +84,7 @@ pub fn expected(cloud: &Cloud, camera: &Camera, is_one: impl Fn(usize) -> bool) 
         let at = |v: f64| (focal * v / near).abs() - radius;
         let half = camera.size.map(|s| 0.5 * f64::from(s));
         let seen = p.z > 0.0 && at(p.x) < half[0] && at(p.y) < half[1];
-        if seen { (std::f64::consts::PI * radius * radius).clamp(4.0, picture) } else { 0.0 }
+        if seen { (std::f64::consts::PI * radius * radius).max(4.0).min(picture) } else { 0.0 }
     };
     let stride = cloud.len().div_ceil(LOOKED_AT).max(1);
     let mut total = Expected::default();

@@ -74,10 +74,10 @@ impl<S: Simd> Pixels<S> {
         let zero = Lanes::splat(simd, 0.0);
         let tau = zero.where_less_or(self.transmittance, self.cutoff, Lanes::load(simd, &fragments.optical_depth[0]));
         let weight = self.transmittance * tau.opacity();
-        self.optical_depth.add(tau);
+        self.optical_depth.add(simd, tau);
         self.transmittance = self.optical_depth.sum.exp_neg();
         for c in 0..3 {
-            self.values[c].add(weight * Lanes::load(simd, &fragments.values[c]));
+            self.values[c].add(simd, weight * Lanes::load(simd, &fragments.values[c]));
         }
     }
 
