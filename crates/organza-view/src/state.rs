@@ -385,10 +385,10 @@ impl State {
             changes.push(Override::parse(&format!("render.technique={technique:?}"))?);
         }
         for (rank, object) in scene.objects.iter().enumerate() {
-            let own = self.objects.get(&rank).and_then(|change| change.technique.as_ref());
-            // Objects that name one of their own in the scene would stay as they are.
-            let of_scene = self.technique.as_ref().filter(|_| object.technique.is_some());
-            if let Some(technique) = own.or(of_scene) {
+            let of_object = self.objects.get(&rank).and_then(|change| change.technique.as_ref());
+            // An object that names a technique in the scene would keep it.
+            let of_picture = self.technique.as_ref().filter(|_| object.technique.is_some());
+            if let Some(technique) = of_object.or(of_picture) {
                 let key = key_of(scene, rank);
                 changes.push(Override::parse(&format!("object.{key}.technique={technique:?}"))?);
             }
@@ -420,7 +420,7 @@ fn key_of(scene: &Scene, rank: usize) -> String {
 fn clip(object: &scene::SceneObject, cuts: &[&Cut]) -> String {
     let half_space =
         |normal: DVec3, point: DVec3| format!("{{ normal = {:?}, point = {:?} }}", normal.to_array(), point.to_array());
-    let own = object.clip.iter().map(|clip| match clip {
+    let of_scene = object.clip.iter().map(|clip| match clip {
         Clip::HalfSpace { normal, offset } => half_space(*normal, *normal * (offset / normal.length_squared())),
         Clip::Box(bounds) => format!("{{ box = [{:?}, {:?}] }}", bounds.min.to_array(), bounds.max.to_array()),
     });
@@ -430,7 +430,7 @@ fn clip(object: &scene::SceneObject, cuts: &[&Cut]) -> String {
         let point = back * (DVec3::from(cut.point) - transform.translation) / transform.scale;
         half_space(back * DVec3::from(cut.normal), point)
     });
-    format!("[{}]", own.chain(of_view).collect::<Vec<_>>().join(", "))
+    format!("[{}]", of_scene.chain(of_view).collect::<Vec<_>>().join(", "))
 }
 
 /// Control points as a scene has them.
@@ -691,15 +691,15 @@ mod tests {
     #[test]
     fn a_technique_of_one_object_stands_before_that_of_all() {
         let of_all = Event::Technique { technique: Some("points".into()) };
-        let own = |technique: Option<&str>| Event::ObjectTechnique {
+        let fog_by = |technique: Option<&str>| Event::ObjectTechnique {
             object: "fog".into(),
             technique: technique.map(str::to_owned),
         };
-        let scene = after(&[own(Some("sheets")), of_all.clone()]).unwrap();
+        let scene = after(&[fog_by(Some("sheets")), of_all.clone()]).unwrap();
         assert_eq!(scene.render.technique, scene::Technique::Points);
         assert_eq!(scene.objects[2].technique, Some(scene::Technique::Sheets));
-        assert_eq!(after(&[own(Some("sheets")), own(None)]).unwrap(), after(&[]).unwrap());
-        assert!(after(&[own(Some("paint"))]).is_err());
+        assert_eq!(after(&[fog_by(Some("sheets")), fog_by(None)]).unwrap(), after(&[]).unwrap());
+        assert!(after(&[fog_by(Some("paint"))]).is_err());
     }
 
     #[test]

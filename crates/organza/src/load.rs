@@ -120,7 +120,7 @@ impl Loaded {
         Some(self.put_aside(fewer))
     }
 
-    /// Has other splats stand for all of them.
+    /// Replaces the splats by fewer ones, and returns all of them.
     fn put_aside(&mut self, fewer: Cloud) -> Everything {
         let everything = Everything {
             cloud: std::mem::replace(&mut self.cloud, fewer),

@@ -78,7 +78,7 @@ pub fn render(scene: &Scene, options: &RenderOptions, progress: &Progress) -> Re
 /// # Errors
 /// As [`render`].
 pub fn render_from(scene: &Scene, options: &RenderOptions, progress: &Progress, files: Files) -> Result<Render, Error> {
-    render_keeping(scene, options, progress, &mut Left { files, is_still: true, ..Left::default() })
+    render_keeping(scene, None, options, progress, &mut Left { files, is_still: true, ..Left::default() })
 }
 
 /// What the frames of an animation leave for the next.
@@ -94,8 +94,6 @@ pub(crate) struct Left {
     is_still: bool,
     /// Whether frames are previews, which have no map of the eye.
     pub(crate) is_preview: bool,
-    /// Of what the next preview shows a part.
-    pub(crate) whole: Option<Scene>,
 }
 
 /// What was made of the last frame's scene.
@@ -107,13 +105,13 @@ struct Made {
     uncut: Option<Uncut>,
 }
 
-/// What splats of a preview were made of, before objects were hidden or cut.
+/// The scene that the splats of a preview were made for, whose objects are neither hidden nor cut, and all of its splats.
 struct Uncut {
     scene: Scene,
     everything: Everything,
 }
 
-/// What was made of another frame, as far as it serves a frame.
+/// What one frame can take over from the frame before it.
 #[derive(Default)]
 struct Served {
     made: Option<(Loaded, Option<Planned>)>,
@@ -210,9 +208,9 @@ fn part_of(whole: Scene, mut loaded: Loaded, scene: &Scene) -> Option<Served> {
 ///
 /// # Errors
 /// As [`crate::render`].
-fn load_part(whole: Scene, scene: &Scene, context: Context<'_>, cost: &mut CostRecord) -> Result<Served, Error> {
-    match load_measured(&whole, context, cost) {
-        Ok(loaded) => Ok(part_of(whole, loaded, scene).unwrap_or_default()),
+fn load_part(whole: &Scene, scene: &Scene, context: Context<'_>, cost: &mut CostRecord) -> Result<Served, Error> {
+    match load_measured(whole, context, cost) {
+        Ok(loaded) => Ok(part_of(whole.clone(), loaded, scene).unwrap_or_default()),
         Err(Error::Limit(_)) => Ok(Served::default()),
         Err(error) => Err(error),
     }
@@ -245,9 +243,10 @@ fn drawn_anew(scene: &Scene, before: &[Technique], by: &[Technique]) -> Vec<Stri
     changed.filter(|((object, _), _)| object.is_chosen).map(sentence).collect()
 }
 
-/// [`render`] with what there is already.
+/// [`render`] with what there is already. A preview of a part of a scene is made of the splats of the `whole`.
 pub(crate) fn render_keeping(
     scene: &Scene,
+    whole: Option<&Scene>,
     options: &RenderOptions,
     progress: &Progress,
     left: &mut Left,
@@ -267,7 +266,7 @@ pub(crate) fn render_keeping(
     let helper = options.device.as_deref().map(Helper::new);
     let mut served = left.take_made(scene, options.max_memory);
     let mut loading = CostRecord::default();
-    if let Some(whole) = left.whole.take().filter(|whole| served.made.is_none() && whole.objects != scene.objects) {
+    if let Some(whole) = whole.filter(|whole| served.made.is_none() && whole.objects != scene.objects) {
         served = load_part(whole, scene, Context { files: &left.files, options, progress }, &mut loading)?;
     }
     let Served { made, mut leaves, uncut } = served;

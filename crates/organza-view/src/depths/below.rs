@@ -78,43 +78,45 @@ impl DataOfObject {
     }
 }
 
-/// The value of a volume between its voxels; `None` outside.
-fn of_volume(grid: &Grid, place: DVec3) -> Option<NamedValue> {
+/// The eight voxels about a place, each with its share of what is interpolated there; `None` farther than `beyond` steps outside.
+fn voxels_about(grid: &Grid, place: DVec3, beyond: f64) -> Option<[WeighedVoxel; 8]> {
     let at = grid.axes.inverse() * (place - grid.origin);
-    let is_inside = (0..3).all(|k| at[k] >= -0.5 && at[k] <= grid.dims[k] as f64 - 0.5);
+    let is_inside = (0..3).all(|k| at[k] >= -beyond && at[k] <= grid.dims[k] as f64 - 1.0 + beyond);
     if !is_inside {
         return None;
     }
     let low = at.floor();
     let share = at - low;
-    let value = |corner: usize| {
+    Some(std::array::from_fn(|corner| {
         let step = |k: usize| (corner >> k & 1) as isize;
-        let weight = (0..3).map(|k| if step(k) == 1 { share[k] } else { 1.0 - share[k] }).product::<f64>();
-        // A voxel without a value has no share in it.
+        let weight = (0..3).map(|k| if step(k) == 1 { share[k] } else { 1.0 - share[k] }).product();
         let value = grid.at_clamped(low.x as isize + step(0), low.y as isize + step(1), low.z as isize + step(2));
-        if weight > 0.0 { weight * f64::from(value) } else { 0.0 }
-    };
-    let value: f64 = (0..8).map(value).sum();
+        WeighedVoxel { value, weight }
+    }))
+}
+
+/// A voxel and its share of what is interpolated.
+struct WeighedVoxel {
+    value: f32,
+    weight: f64,
+}
+
+/// The value of a volume between its voxels; `None` outside.
+fn of_volume(grid: &Grid, place: DVec3) -> Option<NamedValue> {
+    // A voxel without a value has no share in it.
+    let known = voxels_about(grid, place, 0.5)?.into_iter().filter(|voxel| voxel.weight > 0.0);
+    let value: f64 = known.map(|voxel| voxel.weight * f64::from(voxel.value)).sum();
     value.is_finite().then(|| NamedValue::new("value", value))
 }
 
-/// The label around a place on the surface of a region: the one with most of the eight voxels about it, the nearer ones weighing more. 0 is nothing.
+/// The label around a place on the surface of a region: the one that most of the voxels about it have, by their shares. 0 is nothing.
 fn of_labels(grid: &Grid, place: DVec3, labels: Option<&ObjectLabels>) -> Option<NamedValue> {
-    let at = grid.axes.inverse() * (place - grid.origin);
-    let low = at.floor();
-    let share = at - low;
-    let mut weights: Vec<(f32, f64)> = Vec::with_capacity(8);
-    for corner in 0..8 {
-        let step = |k: usize| (corner >> k & 1) as isize;
-        let weight = (0..3).map(|k| if step(k) == 1 { share[k] } else { 1.0 - share[k] }).product::<f64>();
-        let label = grid.at_clamped(low.x as isize + step(0), low.y as isize + step(1), low.z as isize + step(2));
-        match weights.iter_mut().find(|(known, _)| *known == label) {
-            Some((_, sum)) => *sum += weight,
-            None => weights.push((label, weight)),
-        }
-    }
-    let regions = weights.into_iter().filter(|(label, _)| *label > 0.0);
-    let (label, _) = regions.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    // Places are those of coarse pictures, which are a little off.
+    let voxels = voxels_about(grid, place, 1.0)?;
+    let share_of =
+        |label: f32| -> f64 { voxels.iter().filter(|voxel| voxel.value == label).map(|voxel| voxel.weight).sum() };
+    let regions = voxels.iter().map(|voxel| voxel.value).filter(|label| *label > 0.0);
+    let label = regions.max_by(|a, b| share_of(*a).total_cmp(&share_of(*b)))?;
     let meaning = labels.and_then(|labels| labels.table.name(f64::from(label))).map(str::to_owned);
     Some(NamedValue { meaning, ..NamedValue::new("label", f64::from(label)) })
 }

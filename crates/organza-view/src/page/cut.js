@@ -16,6 +16,9 @@ function rounded(number) {
   return Number((Math.round(number / step) * step).toPrecision(12)) + 0;
 }
 
+/// As many as the server takes.
+const MOST_CUTS = 32;
+
 let cuts = [];
 let chosenCut = 0;
 let cutRows = [];
@@ -139,7 +142,7 @@ function fillCuts() {
     if (!isHeld(row.slider)) row.slider.value = position;
     if (!isHeld(row.number)) row.number.value = rounded(position);
   });
-  at("add-cut").disabled = !shown.bounds || cuts.length >= 32;
+  at("add-cut").disabled = !shown.bounds || cuts.length >= MOST_CUTS;
   placePlane();
 }
 

@@ -113,30 +113,17 @@ impl Files {
     /// The names of numbers that points or a mesh can be coloured by, where they are at hand; none of other data. Nothing is read.
     pub fn columns(&self, scene: &Scene, source: &Path, frame: u64) -> Vec<String> {
         let read = self.read.borrow();
-        let of_file = read.get(&(real(source), frame)).map(|(_, (data, notes, _))| (data, notes));
-        let (data, mut names) = match (scene.in_memory.get(source), of_file) {
-            (Some(data), _) => (data, Vec::new()),
-            (None, Some((data, notes))) => (data, notes.columns.iter().map(|column| column.name.clone()).collect()),
-            (None, None) => return Vec::new(),
-        };
-        let mut add = |name: &str| {
-            if !names.iter().any(|known: &String| known == name) {
-                names.push(name.to_owned());
-            }
-        };
-        match data {
-            SourceData::Points(points) if points.gaussians.is_empty() => {
-                points.columns.iter().for_each(|column| add(&column.name));
-                points.not_asked_for(&[]).for_each(&mut add);
-                add("height");
-            }
-            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => {
-                mesh.columns.iter().for_each(|column| add(&column.name));
-                add("height");
-            }
+        let of_file = read.get(&(real(source), frame)).map(|(_, (data, notes, _))| (data, notes.columns.as_slice()));
+        let in_memory = scene.in_memory.get(source).map(|data| (data, &[][..]));
+        let Some((data, of_notes)) = in_memory.or(of_file) else { return Vec::new() };
+        let of_data: Vec<&str> = match data {
+            SourceData::Points(points) if points.gaussians.is_empty() => points.column_names().collect(),
+            SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => mesh.column_names().collect(),
             _ => return Vec::new(),
-        }
-        names
+        };
+        // Of those that the file has beside these, no scene has asked for all.
+        let others = of_notes.iter().map(|column| column.name.as_str()).filter(|name| !of_data.contains(name));
+        others.chain(of_data.iter().copied()).map(str::to_owned).collect()
     }
 
     /// The value of a volume that was read outside of the cells that it was sampled from; `None` where its voxels are those of the file, and of what was

@@ -282,7 +282,7 @@ impl Search<'_> {
         let made =
             Made { scene: resolved.clone(), loaded: self.loaded, planned, leaves: Leaves::default(), uncut: None };
         let mut left = Left { files, is_still: true, made: Some(made), ..Left::default() };
-        let mut render = render_keeping(&resolved, options, progress, &mut left)?;
+        let mut render = render_keeping(&resolved, None, options, progress, &mut left)?;
         let taken = self.begun.elapsed().as_secs_f64() - reading;
         render.cost.stages = [self.cost.stages, render.cost.stages].concat();
         render.found = render.found.or(self.found);

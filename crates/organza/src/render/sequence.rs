@@ -105,10 +105,7 @@ impl Sequence {
         options: &RenderOptions,
         progress: &Progress,
     ) -> Result<Render, Error> {
-        self.left.whole = Some(whole.clone());
-        let render = self.render(frame, options, progress);
-        self.left.whole = None;
-        render
+        render_keeping(frame, Some(whole), options, progress, &mut self.left)
     }
 
     /// Reads, converts and plans a frame without drawing it: a frame that would be refused is refused here.
@@ -140,7 +137,7 @@ impl Sequence {
     /// # Errors
     /// As [`crate::render`].
     pub fn render(&mut self, frame: &Scene, options: &RenderOptions, progress: &Progress) -> Result<Render, Error> {
-        render_keeping(frame, options, progress, &mut self.left)
+        render_keeping(frame, None, options, progress, &mut self.left)
     }
 }
 
@@ -229,7 +226,7 @@ mod tests {
 
     #[test]
     fn previews_of_parts_are_made_of_the_splats_of_the_whole() {
-        // As previews are planned: for all views, so that what nobody sees in one of them stays.
+        // Previews are planned for all views, so that what is not seen in one of them stays.
         let turning = |changes: &[&str]| Scene { frames: Some(2), ..changed(changes) };
         let options = RenderOptions::default();
         let progress = Progress::new();

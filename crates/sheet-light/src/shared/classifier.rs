@@ -71,7 +71,7 @@ impl Classifier {
         [extinction, red, green, blue]
     }
 
-    /// Some of the four numbers, piece by piece.
+    /// Those of the four numbers that `numbers` lists, summed piece by piece.
     #[inline(always)]
     fn some<S: Simd, const N: usize>(&self, simd: S, value: Lanes<S>, numbers: [usize; N]) -> [Lanes<S>; N] {
         let zero = Lanes::splat(simd, 0.0);

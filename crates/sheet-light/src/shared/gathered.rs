@@ -176,7 +176,7 @@ impl<'a> Gathered<'a> {
     fn linear<S: Simd>(&self, simd: S, start: usize, places: &[Lanes<S>; 3], last: &[f32; 3]) -> Lanes<S> {
         let [nx, ny, _] = self.stored;
         let (firsts, parts) = self.cells(simd, start, places, last);
-        // As many of each corner, so that one check of a place does for all of them.
+        // Eight slices of one length, one a corner: the check of a place in one serves the others.
         let count = self.values.len() - (nx * ny + nx + 1);
         let offsets = [0, 1, nx, nx + 1, nx * ny, nx * ny + 1, nx * ny + nx, nx * ny + nx + 1];
         let mut from = [&self.values[..]; 8];

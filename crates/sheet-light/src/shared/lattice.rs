@@ -122,7 +122,7 @@ impl<'a> Lattice<'a> {
         out.extend((0..rim).map(|i| self.value(i, j, k)));
         match self.inside(rim..rim + n, j, k) {
             None => {
-                // What [`Lattice::value`] sums, in its order.
+                // The sum of [`Lattice::value`], term by term in the same order.
                 let terms = self.terms(2, k).map(|(c, k)| self.terms(1, j).map(|(b, j)| (b * c, (k * ny + j) * n)));
                 let sum = |i: usize| {
                     let shown = terms.iter().flatten().filter(|(share, _)| *share != 0.0);

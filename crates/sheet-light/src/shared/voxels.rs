@@ -145,7 +145,7 @@ impl Voxels {
                     values[from - first..to - first].copy_from_slice(inside);
                 }
                 (first..from).chain(to..range.end).for_each(|i| values[i - first] = lattice.value(i, j, k));
-                // What lies behind the row hides nothing.
+                // Places behind the row count as within, as those outside of the lattice do.
                 *word = bits_within(&values[..range.len()], low, high);
             }
         });
@@ -238,7 +238,7 @@ impl Voxels {
 #[inline(always)]
 fn bits_within(values: &[f32], low: f32, high: f32) -> u64 {
     let mut is = [1u8; 64];
-    // What lies outside hides nothing.
+    // Places behind the values count as within, as those outside of the lattice do.
     is.iter_mut().zip(values).for_each(|(is, v)| *is = u8::from((*v >= low) & (*v <= high)));
     // The lowest bits of eight bytes, beside each other.
     let bits = |eight: &[u8; 8]| u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;

@@ -68,7 +68,7 @@ pub(crate) struct Pixels<S: Simd> {
 }
 
 impl<S: Simd> Pixels<S> {
-    /// What [`Picture::composite`] does.
+    /// Composites fragments, as [`Picture::composite`] does.
     #[inline(always)]
     pub(crate) fn composite(&mut self, simd: S, fragments: &Fragments) {
         let zero = Lanes::splat(simd, 0.0);

@@ -43,7 +43,7 @@ impl FoldTile<'_> {
         let Scratch { volumes, near, far, fragments, .. } = &mut *self.scratch;
         let (Some(prepared), Some(scratch)) = (self.sheeted.volumes.first(), volumes.first_mut()) else { return };
         let VolumeScratch { sheets, crossings, kept, active, .. } = scratch;
-        // Where nothing is opaque, limits are those of the range of depths everywhere.
+        // Without anything opaque all pixels have the limits of the range of depths.
         let limits = if self.opaque.is_empty() {
             DepthRange { near: near[0], far: far[0] }
         } else {

@@ -57,7 +57,7 @@ impl Bricks {
             for (i, is_seen) in is_seen.iter().enumerate() {
                 of_row += u32::from(*is_seen);
                 let corner = at + i + 1;
-                // Those of the plane that are in both are counted once.
+                // Both sums hold the bricks before this row and plane: one of them is subtracted.
                 let of_plane = seen_before[corner - sx] + seen_before[corner - sx * sy];
                 seen_before[corner] = of_plane - seen_before[corner - sx * sy - sx] + of_row;
             }
