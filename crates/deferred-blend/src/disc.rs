@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::optics::{self, SurfaceOpacity};
 use splat_core::raster::kernel::Kernel;
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 use splat_core::{Camera, Cloud, FootprintStack, Material, SplatKind};
 
@@ -235,10 +235,11 @@ impl Disc {
     #[inline(always)]
     pub(crate) fn meet<S: Simd>(&self, simd: S, offset: [Lanes<S>; 2]) -> Meeting<S> {
         let [dx, dy] = offset;
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let linear = |at: f32, slope: [f32; 2]| lanes(slope[1]).mul_add(dy, lanes(slope[0]).mul_add(dx, lanes(at)));
+        let linear = |at: f32, slope: [f32; 2]| {
+            simd.lanes(slope[1]).mul_add(dy, simd.lanes(slope[0]).mul_add(dx, simd.lanes(at)))
+        };
         let facing = linear(self.facing, self.facing_slope);
-        let inverse = lanes(1.0) / facing;
+        let inverse = simd.lanes(1.0) / facing;
         // Not by a map of an array: the compiler does not inline that, and calls a function for every instruction.
         let u = linear(self.along[0], self.along_slope[0]) * inverse;
         let v = linear(self.along[1], self.along_slope[1]) * inverse;

@@ -5,7 +5,7 @@
 
 use crate::disc::{Disc, Discs, Meeting};
 use splat_core::raster::bins::Bins;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::raster::tile::{BLOCKS, PIXELS, position};
 
@@ -127,18 +127,19 @@ fn meet_block<S: Simd>(
     corner: [usize; 2],
     pixels: &mut [Vec<Fragment>; PIXELS],
 ) {
-    let lanes = |v: f32| Lanes::splat(simd, v);
     let disc = &discs.discs[i as usize];
     let look = &discs.looks[i as usize];
     let kernel = &discs.kernels[look.footprint as usize];
     let first = position(b * PIXELS, corner[0], corner[1]);
     for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
         let Meeting { facing, distance_sq, depth, .. } = disc.meet(simd, offsets(simd, disc, first, lane));
-        let weight =
-            kernel.profile(simd, (lanes(1.0) - distance_sq).max(lanes(0.0)).where_less(distance_sq, lanes(1.0)));
+        let weight = kernel.profile(
+            simd,
+            (simd.lanes(1.0) - distance_sq).max(simd.lanes(0.0)).where_less(distance_sq, simd.lanes(1.0)),
+        );
         let mut hits = [[0.0; MAX_LANES]; 4];
         for (value, to) in
-            [weight.where_less(lanes(0.0), depth), depth, distance_sq, facing.abs()].iter().zip(&mut hits)
+            [weight.where_less(simd.lanes(0.0), depth), depth, distance_sq, facing.abs()].iter().zip(&mut hits)
         {
             value.store(to);
         }
@@ -155,8 +156,9 @@ fn meet_block<S: Simd>(
 /// Offsets from a disc's centre of the pixels from `lane` on of the block whose first pixel is `first`.
 #[inline(always)]
 pub(crate) fn offsets<S: Simd>(simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> [Lanes<S>; 2] {
-    let from = |axis: usize| Lanes::splat(simd, first[axis] as f32 + 0.5 - disc.center[axis]);
-    [from(0) + Lanes::load(simd, &X[lane..]), from(1) + Lanes::load(simd, &Y[lane..])]
+    let from_x = simd.lanes(first[0] as f32 + 0.5 - disc.center[0]);
+    let from_y = simd.lanes(first[1] as f32 + 0.5 - disc.center[1]);
+    [from_x + Lanes::load(simd, &X[lane..]), from_y + Lanes::load(simd, &Y[lane..])]
 }
 
 /// Offsets of the pixels of a block from its first.

@@ -13,7 +13,7 @@ use super::graph::{OverlapGraph, chunks, cut};
 use super::surfels::{CHUNK, Surfel};
 use rayon::prelude::*;
 use splat_core::glam::Vec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use std::f32::consts::PI;
 
@@ -183,7 +183,7 @@ impl<S: Simd> Frame<S> {
     #[inline(always)]
     fn along(&self, simd: S, v: Vector<S>, per: Lanes<S>) -> Linear<S> {
         let [x, y] = self.t;
-        let least = Lanes::splat(simd, LEAST);
+        let least = simd.lanes(LEAST);
         let p = dot(v, self.a) * per;
         let q = dot(v, self.b) * per;
         let s = q * x - p * y;
@@ -193,17 +193,16 @@ impl<S: Simd> Frame<S> {
     /// The place along a semi-axis of the other disc, in units of it and of the reaches' ratio.
     #[inline(always)]
     fn along_axis(&self, simd: S, axis: Vector<S>) -> Linear<S> {
-        self.along(simd, axis, Lanes::splat(simd, 1.0) / dot(axis, axis))
+        self.along(simd, axis, simd.lanes(1.0) / dot(axis, axis))
     }
 }
 
 /// The share of `disc` that `other` covers.
 #[inline(always)]
 fn covered<S: Simd>(simd: S, lane: usize, disc: &Side, other: &Side, gap: f32) -> Lanes<S> {
-    let lanes = |v: f32| Lanes::splat(simd, v);
-    let zero = lanes(0.0);
-    let one = lanes(1.0);
-    let least = lanes(LEAST);
+    let zero = simd.lanes(0.0);
+    let one = simd.lanes(1.0);
+    let least = simd.lanes(LEAST);
     let a = load(simd, lane, &disc.axes[0]);
     let b = load(simd, lane, &disc.axes[1]);
     let offset = load(simd, lane, &disc.offset);
@@ -229,8 +228,8 @@ fn covered<S: Simd>(simd: S, lane: usize, disc: &Side, other: &Side, gap: f32) -
     let half = root / by.abs();
     let low = (center - half).max(zero - one);
     let high = (center + half).min(one);
-    let middle = lanes(0.5) * (low + high);
-    let half = (lanes(0.5) * (high - low)).max(zero);
+    let middle = simd.lanes(0.5) * (low + high);
+    let half = (simd.lanes(0.5) * (high - low)).max(zero);
     let slope = u.s.mul_add(u.t, v.s * v.t) * per_square;
     let start = u.s.mul_add(u.center, v.s * v.center) * per_square;
     // d₁ is nowhere constant along s.
@@ -238,11 +237,11 @@ fn covered<S: Simd>(simd: S, lane: usize, disc: &Side, other: &Side, gap: f32) -
     let per = one / distance.s;
     let strip_slope = distance.t * per;
     let strip_start = distance.center * per;
-    let reach = lanes(0.5 * gap) * (one + ratio) * per.abs();
+    let reach = simd.lanes(0.5 * gap) * (one + ratio) * per.abs();
     let root_square = root * root;
     let mut sum = zero;
     for [node, weight] in NODES {
-        let t = half.mul_add(lanes(node), middle);
+        let t = half.mul_add(simd.lanes(node), middle);
         let mine = (one - t * t).max(zero).sqrt();
         let passes = by.mul_add(t, zero - at);
         let yours = (root_square - passes * passes).max(zero).sqrt() * per_square;
@@ -250,9 +249,9 @@ fn covered<S: Simd>(simd: S, lane: usize, disc: &Side, other: &Side, gap: f32) -
         let strip = strip_start - strip_slope * t;
         let from = (zero - mine).max(center - yours).max(strip - reach);
         let to = mine.min(center + yours).min(strip + reach);
-        sum = (to - from).max(zero).mul_add(lanes(weight), sum);
+        sum = (to - from).max(zero).mul_add(simd.lanes(weight), sum);
     }
-    (half * sum * lanes(1.0 / PI)).min(one)
+    (half * sum * simd.lanes(1.0 / PI)).min(one)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::fragments::offsets;
 use splat_core::Footprint;
 use splat_core::glam::Vec3;
 use splat_core::raster::kernel::Kernel;
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::tile::{AREA, Line, PIXELS, position};
 
@@ -81,13 +81,12 @@ impl Rules {
     /// A disc met by pixels from `lane` on of the block whose first pixel is `first`.
     #[inline(always)]
     pub(super) fn hit<S: Simd>(&self, simd: S, disc: &Disc, first: [usize; 2], lane: usize) -> Hit<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let Meeting { facing, inverse, distance_sq, depth } = disc.meet(simd, offsets(simd, disc, first, lane));
-        let far = lanes(f32::INFINITY);
-        let depth = depth.where_less_or(distance_sq, lanes(1.0), far);
-        let depth = depth.where_less_or(lanes(0.0), depth, far);
-        let across = lanes(self.gap * disc.radius) * inverse.abs().min(lanes(MOST_OBLIQUE));
-        Hit { depth, limit: depth + across.max(depth * lanes(LEAST_EPSILON)), distance_sq, facing }
+        let far = simd.lanes(f32::INFINITY);
+        let depth = depth.where_less_or(distance_sq, simd.lanes(1.0), far);
+        let depth = depth.where_less_or(simd.lanes(0.0), depth, far);
+        let across = simd.lanes(self.gap * disc.radius) * inverse.abs().min(simd.lanes(MOST_OBLIQUE));
+        Hit { depth, limit: depth + across.max(depth * simd.lanes(LEAST_EPSILON)), distance_sq, facing }
     }
 }
 
@@ -95,8 +94,7 @@ impl<S: Simd> Hit<S> {
     /// w of Eq. 1 where a ray hits.
     #[inline(always)]
     pub(super) fn weight(&self, simd: S, kernel: &Kernel) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        kernel.profile(simd, (lanes(1.0) - self.distance_sq).max(lanes(0.0))).max(lanes(LEAST_WEIGHT))
+        kernel.profile(simd, (simd.lanes(1.0) - self.distance_sq).max(simd.lanes(0.0))).max(simd.lanes(LEAST_WEIGHT))
     }
 }
 
@@ -155,16 +153,18 @@ impl Block {
     /// The core of a disc hides: the nearest so far and what hides most are kept; of several at one depth the first.
     #[inline(always)]
     pub(super) fn hide<S: Simd>(&mut self, simd: S, lane: usize, hit: &Hit<S>, rules: &Rules, rank: u32) {
-        let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let core = lanes(rules.core);
-        let far = lanes(f32::INFINITY);
-        let near = at(&self.near);
+        let core = simd.lanes(rules.core);
+        let far = simd.lanes(f32::INFINITY);
+        let near = Lanes::load(simd, &self.near.0[lane..]);
         let depth = hit.depth.where_less_or(hit.distance_sq, core, far);
         let limit = hit.limit.where_less_or(hit.distance_sq, core, far);
-        at(&self.limit).min(limit).store(&mut self.limit.0[lane..]);
-        lanes(f32::from_bits(rank)).where_less_or(depth, near, at(&self.disc)).store(&mut self.disc.0[lane..]);
-        hit.facing.where_less_or(depth, near, at(&self.facing)).store(&mut self.facing.0[lane..]);
+        Lanes::load(simd, &self.limit.0[lane..]).min(limit).store(&mut self.limit.0[lane..]);
+        simd.lanes(f32::from_bits(rank))
+            .where_less_or(depth, near, Lanes::load(simd, &self.disc.0[lane..]))
+            .store(&mut self.disc.0[lane..]);
+        hit.facing
+            .where_less_or(depth, near, Lanes::load(simd, &self.facing.0[lane..]))
+            .store(&mut self.facing.0[lane..]);
         near.min(depth).store(&mut self.near.0[lane..]);
     }
 
@@ -195,9 +195,8 @@ impl Block {
     /// nearer surfaces, which lie farther than their ε before what hides.
     #[inline(always)]
     pub(super) fn weigh<S: Simd>(&mut self, simd: S, lane: usize, discs: DiscLanes<S>, weight: Lanes<S>) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let DiscLanes { depth, limit: own_limit, side } = discs;
-        let weight = (weight * lanes(FACING_AWAY)).where_less_or(side, lanes(0.0), weight);
+        let weight = (weight * simd.lanes(FACING_AWAY)).where_less_or(side, simd.lanes(0.0), weight);
         let limit = self.limit(simd, lane);
         let near = Lanes::load(simd, &self.near.0[lane..]);
         let weight = weight.where_less(depth, limit).where_less(near, own_limit);
@@ -210,19 +209,17 @@ impl Block {
     /// Below 0 where a disc of some N and normal shows another side than the nearest.
     #[inline(always)]
     pub(super) fn side<S: Simd>(&self, simd: S, lane: usize, facing: Lanes<S>, normal: Vec3) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let front = |axis: usize| Lanes::load(simd, &self.front[axis].0[lane..]);
-        let a = front(0);
-        let b = front(1);
-        let c = front(2);
-        facing * lanes(normal.x).mul_add(a, lanes(normal.y).mul_add(b, lanes(normal.z) * c))
+        let a = Lanes::load(simd, &self.front[0].0[lane..]);
+        let b = Lanes::load(simd, &self.front[1].0[lane..]);
+        let c = Lanes::load(simd, &self.front[2].0[lane..]);
+        facing * simd.lanes(normal.x).mul_add(a, simd.lanes(normal.y).mul_add(b, simd.lanes(normal.z) * c))
     }
 
     /// Adds the values of one disc.
     #[inline(always)]
     pub(super) fn add<S: Simd>(&mut self, simd: S, lane: usize, weight: Lanes<S>, values: &[f32]) {
         for ((sum, nearest), value) in self.sums.iter_mut().zip(&self.nearest).zip(values) {
-            let difference = Lanes::splat(simd, *value) - Lanes::load(simd, &nearest.0[lane..]);
+            let difference = simd.lanes(*value) - Lanes::load(simd, &nearest.0[lane..]);
             add(simd, &mut sum.0[lane..], weight * difference);
         }
     }
@@ -231,17 +228,19 @@ impl Block {
     #[inline(always)]
     pub(super) fn normalize<S: Simd>(&self, simd: S, b: usize, tile: &mut Tile) {
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-            let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-            let lanes = |v: f32| Lanes::splat(simd, v);
             // Where groups have kept none of what is seen the nearest disc stands for all.
-            let near = at(&self.near);
-            let weight = at(&self.weight).max(lanes(NO_WEIGHT));
-            let far = lanes(f32::INFINITY);
+            let near = Lanes::load(simd, &self.near.0[lane..]);
+            let weight = Lanes::load(simd, &self.weight.0[lane..]).max(simd.lanes(NO_WEIGHT));
+            let far = simd.lanes(f32::INFINITY);
             let pixel = b * PIXELS + lane;
-            (near + at(&self.depth) / weight).where_less_or(near, far, far).store(&mut tile.depth[pixel..]);
+            (near + Lanes::load(simd, &self.depth.0[lane..]) / weight)
+                .where_less_or(near, far, far)
+                .store(&mut tile.depth[pixel..]);
             let channels = tile.channels.chunks_exact_mut(AREA).zip(&self.nearest).zip(&self.sums);
             for ((plane, nearest), sum) in channels {
-                (at(nearest) + at(sum) / weight).where_less(near, far).store(&mut plane[pixel..]);
+                (Lanes::load(simd, &nearest.0[lane..]) + Lanes::load(simd, &sum.0[lane..]) / weight)
+                    .where_less(near, far)
+                    .store(&mut plane[pixel..]);
             }
         }
         for (k, disc) in tile.disc[b * PIXELS..][..PIXELS].iter_mut().enumerate() {

@@ -8,7 +8,7 @@ use super::Averaged;
 use super::block::{Block, DiscLanes, Hit, Rules, for_each_disc, line, values_of};
 use crate::disc::Discs;
 use crate::grouping::{Groups, MOST_GROUPS};
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::tile::{Line, PIXELS};
 
@@ -89,7 +89,6 @@ pub(super) fn keep<S: Simd>(
     block: &mut Block,
     images: &mut GroupImages,
 ) {
-    let lanes = |v: f32| Lanes::splat(simd, v);
     images.met = Default::default();
     for &i in list {
         let disc = &discs.discs[i as usize];
@@ -98,7 +97,7 @@ pub(super) fn keep<S: Simd>(
             block.hide(simd, lane, &hit, rules, i);
             let Hit { depth, limit, distance_sq, .. } = hit;
             // What is hidden already is never seen; by Eq. 14 it takes the place of what is, in whatever order both come.
-            let beyond = if rules.floor.is_some() { lanes(f32::INFINITY) } else { block.limit(simd, lane) };
+            let beyond = if rules.floor.is_some() { simd.lanes(f32::INFINITY) } else { block.limit(simd, lane) };
             if !depth.any_less(beyond) {
                 continue;
             }
@@ -107,7 +106,7 @@ pub(super) fn keep<S: Simd>(
                 Some(floor) => behind(simd, image, lane, floored(simd, floor, depth), distance_sq),
                 None => depth - Lanes::load(simd, &image.depth.0[lane..]),
             };
-            if !behind.any_less(lanes(0.0)) {
+            if !behind.any_less(simd.lanes(0.0)) {
                 continue;
             }
             let kernel = &discs.kernels[discs.looks[i as usize].footprint as usize];
@@ -119,7 +118,7 @@ pub(super) fn keep<S: Simd>(
             keep_nearer(simd, &mut image.limit, lane, behind, limit);
             keep_nearer(simd, &mut image.weight, lane, behind, hit.weight(simd, kernel));
             keep_nearer(simd, &mut image.facing, lane, behind, hit.facing);
-            keep_nearer(simd, &mut image.disc, lane, behind, lanes(f32::from_bits(i)));
+            keep_nearer(simd, &mut image.disc, lane, behind, simd.lanes(f32::from_bits(i)));
         }
     }
 }
@@ -128,25 +127,24 @@ pub(super) fn keep<S: Simd>(
 #[inline(always)]
 fn keep_nearer<S: Simd>(simd: S, line: &mut Line, lane: usize, behind: Lanes<S>, new: Lanes<S>) {
     let numbers = &mut line.0[lane..];
-    new.where_less_or(behind, Lanes::splat(simd, 0.0), Lanes::load(simd, numbers)).store(numbers);
+    new.where_less_or(behind, simd.lanes(0.0), Lanes::load(simd, numbers)).store(numbers);
 }
 
 /// By Eq. 14: below 0 where a disc is before an image. Steps are whole or the same, places differ by less than 1, so the sign is that of
 /// the first difference that is not 0.
 #[inline(always)]
 fn behind<S: Simd>(simd: S, image: &GroupImage, lane: usize, step: Lanes<S>, place: Lanes<S>) -> Lanes<S> {
-    let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-    (step - at(&image.step)).mul_add(Lanes::splat(simd, 4.0), place - at(&image.place))
+    (step - Lanes::load(simd, &image.step.0[lane..]))
+        .mul_add(simd.lanes(4.0), place - Lanes::load(simd, &image.place.0[lane..]))
 }
 
 /// Eq. 10, in steps.
 #[inline(always)]
 fn floored<S: Simd>(simd: S, range: [f32; 2], depth: Lanes<S>) -> Lanes<S> {
     let [near, per_depth] = range;
-    let lanes = |v: f32| Lanes::splat(simd, v);
-    let steps = (depth - lanes(near)) * lanes(per_depth);
-    let whole = (steps + lanes(TO_WHOLE)) - lanes(TO_WHOLE);
-    whole - lanes(1.0).where_less(steps, whole)
+    let steps = (depth - simd.lanes(near)) * simd.lanes(per_depth);
+    let whole = (steps + simd.lanes(TO_WHOLE)) - simd.lanes(TO_WHOLE);
+    whole - simd.lanes(1.0).where_less(steps, whole)
 }
 
 /// Fig. 6: of all images those discs are summed that no other hides.
@@ -163,9 +161,12 @@ pub(super) fn composite<S: Simd>(simd: S, input: &Averaged<'_>, images: &GroupIm
         for_each_disc(&image.disc, weights, |disc, shown| {
             let normal = input.discs.normals[disc.to_bits() as usize];
             for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
-                let at = |line: &Line| Lanes::load(simd, &line.0[lane..]);
-                let side = block.side(simd, lane, at(&image.facing), normal);
-                let discs = DiscLanes { depth: at(&image.depth), limit: at(&image.limit), side };
+                let side = block.side(simd, lane, Lanes::load(simd, &image.facing.0[lane..]), normal);
+                let discs = DiscLanes {
+                    depth: Lanes::load(simd, &image.depth.0[lane..]),
+                    limit: Lanes::load(simd, &image.limit.0[lane..]),
+                    side,
+                };
                 let weight = block.weigh(simd, lane, discs, Lanes::load(simd, &shown[lane..]));
                 block.add(simd, lane, weight, values_of(input, disc));
             }

@@ -13,7 +13,7 @@ use crate::shared::lattice::rays::LatticeRays;
 use crate::shared::slabs::{BATCH, Slabs};
 use crate::shared::vectors::COUNTING;
 use splat_core::glam::DVec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
@@ -86,8 +86,8 @@ impl Ribbon {
         let offsets = Lanes::load(simd, offsets);
         let mut places = [offsets; 3];
         for a in 0..3 {
-            let first = Lanes::splat(simd, corner.from(a, first[a]) as f32);
-            places[a] = offsets.mul_add(Lanes::splat(simd, step[a] as f32), first);
+            let first = simd.lanes(corner.from(a, first[a]) as f32);
+            places[a] = offsets.mul_add(simd.lanes(step[a] as f32), first);
         }
         lattice.values(simd, corner, &places)
     }

@@ -7,7 +7,7 @@ use crate::shared::input::SheetInput;
 use crate::shared::vectors::{difference, dot, sum, vector};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::optics::TRACE;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
 use splat_core::{LightShape, Material, SHADED_EFFECTS, Shading, Slide, SlideProjection};
@@ -116,27 +116,26 @@ impl<'a> Lamp<'a> {
     /// Directions to the light, and which share of its intensity is irradiance there without shadow.
     #[inline(always)]
     fn arriving<S: Simd>(&self, simd: S, places: &[Lanes<S>; 3], spread: f32) -> ([Lanes<S>; 3], Lanes<S>) {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let (place, beam) = match self.shape {
-            Shape::Parallel(to_light) => return (vector(simd, to_light), broadcast(1.0)),
+            Shape::Parallel(to_light) => return (vector(simd, to_light), simd.lanes(1.0)),
             Shape::From(place, beam) => (place, beam),
         };
-        let way = [broadcast(place.x) - places[0], broadcast(place.y) - places[1], broadcast(place.z) - places[2]];
-        let falloff = broadcast(1.0) / (dot(&way, &way) + broadcast(spread)).max(broadcast(f32::MIN_POSITIVE));
+        let way = [simd.lanes(place.x) - places[0], simd.lanes(place.y) - places[1], simd.lanes(place.z) - places[2]];
+        let falloff = simd.lanes(1.0) / (dot(&way, &way) + simd.lanes(spread)).max(simd.lanes(f32::MIN_POSITIVE));
         let inverse = falloff.sqrt();
         let to_light = [way[0] * inverse, way[1] * inverse, way[2] * inverse];
         match beam {
             Beam::Even => (to_light, falloff),
             Beam::Cosine(normal) => {
-                let cosine = broadcast(0.0) - dot(&to_light, &vector(simd, normal));
-                (to_light, falloff * cosine.max(broadcast(0.0)))
+                let cosine = simd.lanes(0.0) - dot(&to_light, &vector(simd, normal));
+                (to_light, falloff * cosine.max(simd.lanes(0.0)))
             }
             Beam::Cone(axis, [rim, per]) => {
                 let apart = sum(&to_light, &vector(simd, axis));
                 // A direction is shorter than 1 by what softens the light.
-                let beside = (dot(&apart, &apart) + broadcast(spread) * falloff) * broadcast(0.5);
-                let t = ((broadcast(rim) - beside) * broadcast(per)).max(broadcast(0.0)).min(broadcast(1.0));
-                (to_light, falloff * t * t * (broadcast(3.0) - broadcast(2.0) * t))
+                let beside = (dot(&apart, &apart) + simd.lanes(spread) * falloff) * simd.lanes(0.5);
+                let t = ((simd.lanes(rim) - beside) * simd.lanes(per)).max(simd.lanes(0.0)).min(simd.lanes(1.0));
+                (to_light, falloff * t * t * (simd.lanes(3.0) - simd.lanes(2.0) * t))
             }
         }
     }
@@ -146,17 +145,16 @@ impl SlideInView<'_> {
     /// What it lets through, as [`Slide::passing`] has it: places by lanes, look-ups one by one.
     #[inline(always)]
     fn passing<S: Simd>(&self, simd: S, places: &[Lanes<S>; 3], spread: f32) -> [Lanes<S>; 3] {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let way = [
-            places[0] - broadcast(self.origin.x),
-            places[1] - broadcast(self.origin.y),
-            places[2] - broadcast(self.origin.z),
+            places[0] - simd.lanes(self.origin.x),
+            places[1] - simd.lanes(self.origin.y),
+            places[2] - simd.lanes(self.origin.z),
         ];
-        let mut depth = broadcast(1.0);
+        let mut depth = simd.lanes(1.0);
         if let Some(axis) = self.axis {
             depth = dot(&way, &vector(simd, axis));
         }
-        let half = broadcast(0.5);
+        let half = simd.lanes(0.5);
         let mut numbers = [[0.0; MAX_LANES]; 3];
         let sides = [dot(&way, &vector(simd, self.across)), dot(&way, &vector(simd, self.down)), depth];
         numbers
@@ -189,13 +187,13 @@ impl Reflector<'_> {
     ) {
         let (to_light, share) = lamp.arriving(simd, &spots.places, self.spread);
         let (factor, specular) = self.factors(simd, spots, &to_light);
-        let mut passing = [Lanes::splat(simd, 1.0); 3];
+        let mut passing = [simd.lanes(1.0); 3];
         if let Some(slide) = &lamp.slide {
             passing = slide.passing(simd, &spots.places, self.spread);
         }
         for c in 0..3 {
-            let irradiance = share * Lanes::splat(simd, lamp.intensity[c]) * passing[c];
-            let irradiance = irradiance.where_less(Lanes::splat(simd, TRACE), irradiance);
+            let irradiance = share * simd.lanes(lamp.intensity[c]) * passing[c];
+            let irradiance = irradiance.where_less(simd.lanes(TRACE), irradiance);
             let arrives = if lamp.has_shadow { irradiance * self.taken(simd, through[c]) } else { irradiance };
             lit.radiance[c] = arrives.mul_add(spots.color[c].mul_add(factor, specular), lit.radiance[c]);
             if c == 1 {
@@ -214,20 +212,20 @@ impl Reflector<'_> {
         lit: &Lit<S>,
     ) -> [[Lanes<S>; 3]; SHADED_EFFECTS.len()] {
         let m = self.material;
-        let zero = Lanes::splat(simd, 0.0);
-        let half = Lanes::splat(simd, 0.5);
+        let zero = simd.lanes(0.0);
+        let half = simd.lanes(0.5);
         let mut out = [[zero; 3]; SHADED_EFFECTS.len()];
         let is_unlit = m.shading == Shading::Unlit;
         let is_normal = if m.shading == Shading::Phase { zero } else { spots.is_normal };
-        let albedo = Lanes::splat(simd, m.single_scattering_albedo);
-        let reflectance = albedo.where_less_or(is_normal, half, Lanes::splat(simd, m.diffuse));
+        let albedo = simd.lanes(m.single_scattering_albedo);
+        let reflectance = albedo.where_less_or(is_normal, half, simd.lanes(m.diffuse));
         for c in 0..3 {
-            let emission = Lanes::splat(simd, m.emission[c]);
+            let emission = simd.lanes(m.emission[c]);
             if is_unlit {
                 out[1][c] = emission + spots.color[c];
                 continue;
             }
-            out[0][c] = spots.color[c] * reflectance * Lanes::splat(simd, ambient[c] * m.ambient);
+            out[0][c] = spots.color[c] * reflectance * simd.lanes(ambient[c] * m.ambient);
             out[1][c] = emission;
             out[2][c] = lit.radiance[c].where_less(half, is_normal);
             out[3][c] = lit.radiance[c].where_less(is_normal, half);
@@ -238,15 +236,15 @@ impl Reflector<'_> {
     /// What arrives where a medium takes its share of a shadow.
     #[inline(always)]
     fn taken<S: Simd>(&self, simd: S, through: Lanes<S>) -> Lanes<S> {
-        let one = Lanes::splat(simd, 1.0);
-        (one - through).negate_mul_add(Lanes::splat(simd, self.shadow_coefficient), one)
+        let one = simd.lanes(1.0);
+        (one - through).negate_mul_add(simd.lanes(self.shadow_coefficient), one)
     }
 
     /// Per unit irradiance: the factor on the colour, and what is specular.
     #[inline(always)]
     fn factors<S: Simd>(&self, simd: S, spots: &Spots<S>, to_light: &[Lanes<S>; 3]) -> (Lanes<S>, Lanes<S>) {
-        let zero = Lanes::splat(simd, 0.0);
-        let half = Lanes::splat(simd, 0.5);
+        let zero = simd.lanes(0.0);
+        let half = simd.lanes(0.5);
         if self.material.shading == Shading::Phase || !self.has_normals {
             return (self.scatter(simd, &spots.to_eye, to_light), zero);
         }
@@ -261,59 +259,56 @@ impl Reflector<'_> {
     /// Albedo times the phase function of Henyey and Greenstein, as [`splat_core::henyey_greenstein`] has it.
     #[inline(always)]
     fn scatter<S: Simd>(&self, simd: S, to_eye: &[Lanes<S>; 3], to_light: &[Lanes<S>; 3]) -> Lanes<S> {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let g = self.material.asymmetry.abs();
         let whole = self.material.single_scattering_albedo * (1.0 - g) * (1.0 + g) / (4.0 * PI);
         let apart = if self.material.asymmetry >= 0.0 { sum(to_light, to_eye) } else { difference(to_light, to_eye) };
-        let d = dot(&apart, &apart).mul_add(broadcast(g), broadcast((1.0 - g) * (1.0 - g)));
-        broadcast(whole) / (d * d.sqrt())
+        let d = dot(&apart, &apart).mul_add(simd.lanes(g), simd.lanes((1.0 - g) * (1.0 - g)));
+        simd.lanes(whole) / (d * d.sqrt())
     }
 
     /// Diffuse and specular reflection, as [`Material::reflect`] has them.
     #[inline(always)]
     fn reflect<S: Simd>(&self, simd: S, spots: &Spots<S>, to_light: &[Lanes<S>; 3]) -> (Lanes<S>, Lanes<S>) {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let m = self.material;
         let cosine = dot(&spots.normal, to_light);
-        let front = cosine.max(broadcast(0.0));
-        let back = (broadcast(0.0) - cosine).max(broadcast(0.0));
+        let front = cosine.max(simd.lanes(0.0));
+        let back = (simd.lanes(0.0) - cosine).max(simd.lanes(0.0));
         let diffuse =
-            (front * broadcast(1.0 - m.transmission) + back * broadcast(m.transmission)) * broadcast(m.diffuse / PI);
+            (front * simd.lanes(1.0 - m.transmission) + back * simd.lanes(m.transmission)) * simd.lanes(m.diffuse / PI);
         if m.specular <= 0.0 {
-            return (diffuse, broadcast(0.0));
+            return (diffuse, simd.lanes(0.0));
         }
         // r·v, r the light mirrored at the normal.
-        let mirrored = (broadcast(2.0) * cosine) * dot(&spots.normal, &spots.to_eye) - dot(to_light, &spots.to_eye);
+        let mirrored = (simd.lanes(2.0) * cosine) * dot(&spots.normal, &spots.to_eye) - dot(to_light, &spots.to_eye);
         let lobe = power(simd, mirrored, m.shininess);
-        (diffuse, lobe * front * broadcast(m.specular * (m.shininess + 2.0) / (2.0 * PI)))
+        (diffuse, lobe * front * simd.lanes(m.specular * (m.shininess + 2.0) / (2.0 * PI)))
     }
 }
 
 impl<S: Simd> Lit<S> {
     #[inline(always)]
     pub(crate) fn dark(simd: S) -> Self {
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         Self { radiance: [zero; 3], received: zero, unshadowed: zero }
     }
 
     /// Share of green light that shadows let through; 1 where no light arrives.
     #[inline(always)]
     pub(crate) fn shadow(&self, simd: S) -> Lanes<S> {
-        let zero = Lanes::splat(simd, 0.0);
-        let least = Lanes::splat(simd, f32::MIN_POSITIVE);
-        (self.received / self.unshadowed.max(least)).where_less_or(zero, self.unshadowed, Lanes::splat(simd, 1.0))
+        let zero = simd.lanes(0.0);
+        let least = simd.lanes(f32::MIN_POSITIVE);
+        (self.received / self.unshadowed.max(least)).where_less_or(zero, self.unshadowed, simd.lanes(1.0))
     }
 }
 
 /// max(x, 0)^exponent for x ≤ 1 or next to it, exponent ≥ 0; 0⁰ is 1.
 #[inline(always)]
 fn power<S: Simd>(simd: S, x: Lanes<S>, exponent: f32) -> Lanes<S> {
-    let broadcast = |v: f32| Lanes::splat(simd, v);
     if exponent == 0.0 {
-        return broadcast(1.0);
+        return simd.lanes(1.0);
     }
-    let positive = (broadcast(-exponent) * x.max(broadcast(f32::MIN_POSITIVE)).logarithm()).exp_neg();
-    positive.where_less(broadcast(0.0), x)
+    let positive = (simd.lanes(-exponent) * x.max(simd.lanes(f32::MIN_POSITIVE)).logarithm()).exp_neg();
+    positive.where_less(simd.lanes(0.0), x)
 }
 
 #[cfg(test)]
@@ -396,7 +391,7 @@ mod tests {
         type Output = Vec<f32>;
 
         fn with_simd<S: Simd>(self, simd: S) -> Vec<f32> {
-            let is_normal = Lanes::splat(simd, if self.normal == Vec3::ZERO { 0.0 } else { 1.0 });
+            let is_normal = simd.lanes(if self.normal == Vec3::ZERO { 0.0 } else { 1.0 });
             let places = vector(simd, self.place);
             let to_eye = vector(simd, self.to_eye);
             let color = vector(simd, Vec3::from_array(self.color));

@@ -6,7 +6,7 @@
 
 use super::value_range::ValueRange;
 use splat_core::TransferFunction;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// Pieces up to which each is tried on all lanes; more are looked up lane by lane.
@@ -64,7 +64,7 @@ impl Classifier {
             return self.look_up(simd, value);
         }
         let [extinction] = self.some(simd, value, [0]);
-        if !Lanes::splat(simd, 0.0).any_less(extinction) {
+        if !simd.lanes(0.0).any_less(extinction) {
             return [extinction; 4];
         }
         let [red, green, blue] = self.some(simd, value, [1, 2, 3]);
@@ -74,18 +74,18 @@ impl Classifier {
     /// Those of the four numbers that `numbers` lists, summed piece by piece.
     #[inline(always)]
     fn some<S: Simd, const N: usize>(&self, simd: S, value: Lanes<S>, numbers: [usize; N]) -> [Lanes<S>; N] {
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let mut out = [zero; N];
         for n in 0..N {
-            out[n] = Lanes::splat(simd, self.first[numbers[n]]);
+            out[n] = simd.lanes(self.first[numbers[n]]);
         }
         for piece in &self.pieces {
-            let knot = Lanes::splat(simd, piece.value);
+            let knot = simd.lanes(piece.value);
             let beyond = value - knot;
             for n in 0..N {
                 let c = numbers[n];
-                let start = Lanes::splat(simd, piece.start[c]);
-                let here = Lanes::splat(simd, piece.slope[c]).mul_add(beyond, start).max(zero);
+                let start = simd.lanes(piece.start[c]);
+                let here = simd.lanes(piece.slope[c]).mul_add(beyond, start).max(zero);
                 out[n] = out[n].where_less_or(value, knot, here);
             }
         }
@@ -101,9 +101,8 @@ impl Classifier {
             let class = self.class_of(values[lane]);
             (0..4).for_each(|c| out[c][lane] = class[c]);
         }
-        let load = |c: usize| Lanes::load(simd, &out[c]);
-        // Not `map`, which is not compiled into code for vectors.
-        [load(0), load(1), load(2), load(3)]
+        // Neither a closure nor `map`, which are not compiled into code for vectors.
+        [Lanes::load(simd, &out[0]), Lanes::load(simd, &out[1]), Lanes::load(simd, &out[2]), Lanes::load(simd, &out[3])]
     }
 
     /// Extinction, red, green and blue of one value.
@@ -189,7 +188,7 @@ mod tests {
         type Output = [f32; 4];
 
         fn with_simd<S: Simd>(self, simd: S) -> [f32; 4] {
-            self.0.classify(simd, Lanes::splat(simd, self.1)).map(|lanes| {
+            self.0.classify(simd, simd.lanes(self.1)).map(|lanes| {
                 let mut out = [0.0; MAX_LANES];
                 lanes.store(&mut out);
                 out[0]

@@ -17,7 +17,7 @@ use crate::shared::params::GatherKernel;
 use crate::shared::vectors::NATURAL;
 use crate::shared::voxels::{Voxels, without_extinction};
 use bricks::{Box3, Bricks};
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::{Grid, Packing, TransferFunction};
 use std::borrow::Cow;
@@ -132,8 +132,7 @@ impl<'a> Gathered<'a> {
             GatherKernel::Gaussian => self.cubic(simd, corner.start, places, &corner.last),
         };
         let relative = self.relative;
-        (value - Lanes::splat(simd, relative.high) - Lanes::splat(simd, relative.low))
-            * Lanes::splat(simd, relative.factor)
+        (value - simd.lanes(relative.high) - simd.lanes(relative.low)) * simd.lanes(relative.factor)
     }
 
     /// The first voxels of the cells of places, which are counted from `start`, and how far behind these the places lie along each axis: in \[0, 1\], and
@@ -146,15 +145,15 @@ impl<'a> Gathered<'a> {
         places: &[Lanes<S>; 3],
         last: &[f32; 3],
     ) -> ([usize; MAX_LANES], [Lanes<S>; 3]) {
-        let natural = Lanes::splat(simd, NATURAL);
+        let natural = simd.lanes(NATURAL);
         let outside = self.kernel.outside();
         let mut parts = *places;
         let mut cells = [[0.0f32; MAX_LANES]; 3];
         for a in 0..3 {
-            let place = places[a].max(Lanes::splat(simd, -outside)).min(Lanes::splat(simd, last[a] + 1.0 + outside));
+            let place = places[a].max(simd.lanes(-outside)).min(simd.lanes(last[a] + 1.0 + outside));
             // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
-            let rounded = (place - Lanes::splat(simd, 0.5)) + natural;
-            let cell = rounded.max(natural).min(Lanes::splat(simd, NATURAL + last[a]));
+            let rounded = (place - simd.lanes(0.5)) + natural;
+            let cell = rounded.max(natural).min(simd.lanes(NATURAL + last[a]));
             parts[a] = place - (cell - natural);
             cell.store(&mut cells[a]);
         }
@@ -305,10 +304,10 @@ fn edge<S: Simd>(simd: S, corners: &[[f32; MAX_LANES]; 8], corner: usize, part: 
 /// The four shares of a cubic B-spline, a part `t` of a step behind the second voxel.
 #[inline(always)]
 fn spline<S: Simd>(simd: S, t: Lanes<S>) -> [Lanes<S>; 4] {
-    let one = Lanes::splat(simd, 1.0);
-    let half = Lanes::splat(simd, 0.5);
-    let sixth = Lanes::splat(simd, 1.0 / 6.0);
-    let two_thirds = Lanes::splat(simd, 2.0 / 3.0);
+    let one = simd.lanes(1.0);
+    let half = simd.lanes(0.5);
+    let sixth = simd.lanes(1.0 / 6.0);
+    let two_thirds = simd.lanes(2.0 / 3.0);
     let u = one - t;
     let second = two_thirds - half * t * t * (one + u);
     let third = two_thirds - half * u * u * (one + t);

@@ -11,7 +11,7 @@ use crate::{Params, Volume};
 use rayon::prelude::*;
 use splat_core::Packing;
 use splat_core::glam::DVec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// The gradients of one volume's needed voxels.
@@ -69,11 +69,11 @@ impl GradientVolume {
                 }
             }
         }
-        let mut out = [Lanes::splat(simd, 0.0); 3];
+        let mut out = [simd.lanes(0.0); 3];
         for a in 0..3 {
             let along = Lanes::load(simd, &sums[a]);
             for c in 0..3 {
-                out[c] = along.mul_add(Lanes::splat(simd, self.directions[a][c]), out[c]);
+                out[c] = along.mul_add(simd.lanes(self.directions[a][c]), out[c]);
             }
         }
         out
@@ -148,7 +148,7 @@ mod tests {
         for n in 0..2000 {
             let side = |a: u64| reach * (2.0 * rng::unit(5, a, n, 0) - 1.0) * middle[a as usize];
             let place = axes * DVec3::new(side(0), side(1), side(2));
-            let places = [place.x, place.y, place.z].map(|v| Lanes::splat(pulp::Scalar, v as f32));
+            let places = [place.x, place.y, place.z].map(|v| pulp::Scalar.lanes(v as f32));
             let found = gradients.gradients(pulp::Scalar, &voxels, &places, 1).map(|lanes| {
                 let mut out = [0.0; MAX_LANES];
                 lanes.store(&mut out);

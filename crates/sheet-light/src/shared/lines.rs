@@ -2,7 +2,7 @@
 
 use super::pixel::{Pixel, PixelForm};
 use splat_core::Material;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::source::{Source, TileRays};
 use splat_core::raster::tile::{Line, PIXELS, Run};
@@ -123,17 +123,17 @@ impl Lines {
             let to = &mut lines[line].0[run.lane..];
             (Lanes::load(simd, to) + v).store(to);
         };
-        let of_plane = |p: usize| tau * Lanes::splat(simd, extinction[p]);
+        let of_plane = |p: usize| tau * simd.lanes(extinction[p]);
         (0..self.planes).for_each(|p| add(p, of_plane(p)));
         for (c, value) in values.iter().enumerate() {
             let p = ChannelLayout::plane_of(c, self.channels, self.planes);
-            add(self.planes + c, of_plane(p) * Lanes::splat(simd, *value));
+            add(self.planes + c, of_plane(p) * simd.lanes(*value));
         }
         if self.has_depths {
             let green = of_plane(self.planes / 2);
             let line = self.planes + self.channels;
             add(line, green * source.view_depth(simd, run, rays));
-            add(line + 1, green * Lanes::splat(simd, source.thickness()));
+            add(line + 1, green * simd.lanes(source.thickness()));
         }
         if !self.objects.is_empty() {
             self.name::<S>(*object, block * PIXELS + run.lane, tau);
@@ -175,18 +175,18 @@ impl Lines {
         backdrop: Backdrop<'_>,
     ) -> [f32; MAX_LANES] {
         let Backdrop { optical_depth, values, is_any } = backdrop;
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let part = Lanes::load(simd, share);
         let mut before = [zero; 3];
         if is_any {
             (0..self.planes).for_each(|p| before[p] = Lanes::load(simd, &optical_depth[p]));
         }
-        let least = Lanes::splat(simd, f32::MIN_POSITIVE);
+        let least = simd.lanes(f32::MIN_POSITIVE);
         let mut inverse = [zero; 3];
         for p in 0..self.planes {
             let optical_depth_of_both = before[p] + self.row(simd, p, first) * part;
             optical_depth_of_both.store(&mut optical_depth[p]);
-            inverse[p] = Lanes::splat(simd, 1.0) / optical_depth_of_both.max(least);
+            inverse[p] = simd.lanes(1.0) / optical_depth_of_both.max(least);
         }
         for c in 0..self.channels {
             let p = ChannelLayout::plane_of(c, self.channels, self.planes);
@@ -214,7 +214,7 @@ impl Lines {
         let mut out = PixelDepths { optical_depth: zero, depth: zero, thickness: zero };
         green.store(&mut out.optical_depth);
         if self.has_depths {
-            let weight = green.max(Lanes::splat(simd, f32::MIN_POSITIVE));
+            let weight = green.max(simd.lanes(f32::MIN_POSITIVE));
             (self.row(simd, line, first) / weight).store(&mut out.depth);
             (self.row(simd, line + 1, first) / weight).store(&mut out.thickness);
         }

@@ -9,7 +9,7 @@ use super::lattice::neighbours::{Cells, Neighbours, Receivers, lanes};
 use crate::Error;
 use rayon::prelude::*;
 use splat_core::glam::DVec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
 use splat_core::{Progress, Receiver, SplatKind, Transmittance};
@@ -57,8 +57,8 @@ impl Shadows {
     /// What arrives of a light there; all of one without shadows, and where no voxel is known.
     #[inline(always)]
     pub(crate) fn transmittance<S: Simd>(&self, simd: S, cells: &Cells, light: usize) -> [Lanes<S>; 3] {
-        let zero = Lanes::splat(simd, 0.0);
-        let one = Lanes::splat(simd, 1.0);
+        let zero = simd.lanes(0.0);
+        let one = simd.lanes(1.0);
         let Some(shares) = self.of_lights[light].as_deref() else {
             return [one; 3];
         };
@@ -70,7 +70,7 @@ impl Shadows {
             }
         }
         let whole = Lanes::load(simd, &sums[3]);
-        let inverse = one / whole.max(Lanes::splat(simd, f32::MIN_POSITIVE));
+        let inverse = one / whole.max(simd.lanes(f32::MIN_POSITIVE));
         let through = [Lanes::load(simd, &sums[0]), Lanes::load(simd, &sums[1]), Lanes::load(simd, &sums[2])];
         [
             (through[0] * inverse).where_less_or(zero, whole, one),

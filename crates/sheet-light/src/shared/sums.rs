@@ -1,6 +1,6 @@
 //! Sums that are rounded to half precision, to see what buffers of 16 bits do.
 
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 
 /// 2¹³ + 1: Veltkamp's splitting keeps 11 of 24 bits.
@@ -12,8 +12,8 @@ const LARGEST: f32 = 1e34;
 /// Rounded to 11 bits, whatever their size.
 #[inline(always)]
 pub(crate) fn rounded<S: Simd>(simd: S, sums: Lanes<S>) -> Lanes<S> {
-    let scaled = sums * Lanes::splat(simd, SPLIT);
-    (scaled - (scaled - sums)).where_less_or(sums.abs(), Lanes::splat(simd, LARGEST), sums)
+    let scaled = sums * simd.lanes(SPLIT);
+    (scaled - (scaled - sums)).where_less_or(sums.abs(), simd.lanes(LARGEST), sums)
 }
 
 /// The same of one number.
@@ -59,7 +59,7 @@ impl<S: Simd> Sum<S> {
     #[inline(always)]
     pub(crate) fn add(&mut self, simd: S, term: Lanes<S>) {
         let size = term.abs();
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let term = term - self.excess;
         let new = self.sum + term;
         let excess = (new - self.sum) - term;

@@ -1,7 +1,7 @@
 //! Vectors of neighbouring pixels, lane by lane.
 
 use splat_core::glam::Vec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// 2²³, from which on floats are natural numbers.
@@ -13,7 +13,7 @@ pub(crate) const COUNTING: [f32; MAX_LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 8
 /// A vector on all lanes.
 #[inline(always)]
 pub(crate) fn vector<S: Simd>(simd: S, v: Vec3) -> [Lanes<S>; 3] {
-    [Lanes::splat(simd, v.x), Lanes::splat(simd, v.y), Lanes::splat(simd, v.z)]
+    [simd.lanes(v.x), simd.lanes(v.y), simd.lanes(v.z)]
 }
 
 #[inline(always)]

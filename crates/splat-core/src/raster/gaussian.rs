@@ -8,7 +8,7 @@
 //! Deviations: what lies less than a standard deviation before the eye plane is not seen, where its authors cut at 0.2 units of a scene; and
 //! every fragment is what α says, where they stop at a transmittance of 10⁻⁴.
 
-use super::lanes::Lanes;
+use super::lanes::{Broadcast, Lanes};
 use super::project::Projector;
 use super::projected::{Coverage, ProjectedDepth, ProjectedSplat};
 use crate::Gaussians;
@@ -89,8 +89,7 @@ impl Projector<'_> {
 /// Optical depth of a fragment whose s is `distance_sq`: −ln(1 − α).
 #[inline(always)]
 pub(super) fn optical_depth<S: Simd>(simd: S, opacity: f32, distance_sq: Lanes<S>) -> Lanes<S> {
-    let lanes = |v: f32| Lanes::splat(simd, v);
-    let alpha = (lanes(opacity) * distance_sq.exp_neg()).min(lanes(Gaussians::MOST_OPACITY));
-    let tau = lanes(0.0) - (lanes(1.0) - alpha).logarithm();
-    lanes(0.0).where_less_or(alpha, lanes(Gaussians::LEAST_OPACITY), tau)
+    let alpha = (simd.lanes(opacity) * distance_sq.exp_neg()).min(simd.lanes(Gaussians::MOST_OPACITY));
+    let tau = simd.lanes(0.0) - (simd.lanes(1.0) - alpha).logarithm();
+    simd.lanes(0.0).where_less_or(alpha, simd.lanes(Gaussians::LEAST_OPACITY), tau)
 }

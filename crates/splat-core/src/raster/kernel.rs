@@ -15,7 +15,7 @@
 //! where the polynomial E makes |error of C| < 10⁻⁶, that of its own rounding, for cutoffs up to 3, 2·10⁻⁵ beyond. Wider footprints than of 4.3
 //! deviations are narrowed to these: less than 2·10⁻⁵ of them lies beyond.
 
-use super::lanes::{Lanes, exp_neg};
+use super::lanes::{Broadcast, Lanes, exp_neg};
 use crate::{Footprint, FootprintImage, FootprintStack};
 use pulp::Simd;
 use std::f64::consts::PI;
@@ -125,39 +125,39 @@ impl Kernel {
     /// w at t = max(1 − s, 0), 1 − e^−q·(1 + q + q²/2) at the centre.
     #[inline(always)]
     pub fn profile<S: Simd>(&self, simd: S, t: Lanes<S>) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         if self.smooth {
             // Pairs first: half the latency of Horner's scheme.
             let g = &self.g;
             let t2 = t * t;
-            let a = lanes(g[1]).mul_add(t, lanes(g[0]));
-            let b = lanes(g[3]).mul_add(t, lanes(g[2]));
-            let c = lanes(g[5]).mul_add(t, lanes(g[4]));
-            let d = lanes(g[7]).mul_add(t, lanes(g[6]));
+            let a = simd.lanes(g[1]).mul_add(t, simd.lanes(g[0]));
+            let b = simd.lanes(g[3]).mul_add(t, simd.lanes(g[2]));
+            let c = simd.lanes(g[5]).mul_add(t, simd.lanes(g[4]));
+            let d = simd.lanes(g[7]).mul_add(t, simd.lanes(g[6]));
             let low = b.mul_add(t2, a);
             let high = d.mul_add(t2, c);
             return high.mul_add(t2 * t2, low) * (t2 * t);
         }
-        let q = lanes(self.sharpness);
+        let q = simd.lanes(self.sharpness);
         let r = q * t;
-        let taper = lanes(self.rim) * (lanes(1.0) + r + lanes(0.5) * r * r);
-        ((q - r).exp_neg() - taper).max(lanes(0.0)).where_less(lanes(0.0), t)
+        let taper = simd.lanes(self.rim) * (simd.lanes(1.0) + r + simd.lanes(0.5) * r * r);
+        ((q - r).exp_neg() - taper).max(simd.lanes(0.0)).where_less(simd.lanes(0.0), t)
     }
 
     /// Share of the kernel before a plane across the ray, `distance` behind its centre in units of [`Kernel::half_width`]·R.
     #[inline(always)]
     pub(crate) fn share_before<S: Simd>(&self, simd: S, distance: Lanes<S>) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let t = distance.max(lanes(-1.0)).min(lanes(1.0));
+        let t = distance.max(simd.lanes(-1.0)).min(simd.lanes(1.0));
         // Not `map`, which is not compiled into code for vectors.
         let [a, b, c, d, e, f] = self.share;
-        let [a, b, c, d, e, f] = [lanes(a), lanes(b), lanes(c), lanes(d), lanes(e), lanes(f)];
-        let before = lanes(1.0) + t;
-        let behind = lanes(1.0) - t;
+        let [a, b, c, d, e, f] =
+            [simd.lanes(a), simd.lanes(b), simd.lanes(c), simd.lanes(d), simd.lanes(e), simd.lanes(f)];
+        let before = simd.lanes(1.0) + t;
+        let behind = simd.lanes(1.0) - t;
         let square = t * t;
         let [before, behind] = [before * before, behind * behind];
         let correction = a + square * (b + square * (c + square * (d + square * (e + square * f))));
-        let triweight = lanes(0.5) - t * (lanes(0.906_25) - t * (lanes(0.625) - t * lanes(0.156_25)));
+        let triweight =
+            simd.lanes(0.5) - t * (simd.lanes(0.906_25) - t * (simd.lanes(0.625) - t * simd.lanes(0.156_25)));
         before * before * (triweight + t * (behind * behind) * correction)
     }
 }
@@ -226,7 +226,7 @@ mod tests {
 
         fn with_simd<S: Simd>(self, simd: S) -> f32 {
             let mut out = [0.0; MAX_LANES];
-            let t = (Lanes::splat(simd, 1.0) - Lanes::splat(simd, self.1)).max(Lanes::splat(simd, 0.0));
+            let t = (simd.lanes(1.0) - simd.lanes(self.1)).max(simd.lanes(0.0));
             self.0.profile(simd, t).store(&mut out);
             out[0]
         }
@@ -275,7 +275,7 @@ mod tests {
 
         fn with_simd<S: Simd>(self, simd: S) -> f32 {
             let mut out = [0.0; MAX_LANES];
-            self.0.share_before(simd, Lanes::splat(simd, self.1)).store(&mut out);
+            self.0.share_before(simd, simd.lanes(self.1)).store(&mut out);
             out[0]
         }
     }

@@ -4,7 +4,7 @@
 //! every instruction set gives the same bits.
 //!
 //! ```
-//! use splat_core::raster::{lanes::Lanes, pulp};
+//! use splat_core::raster::{lanes::Broadcast, pulp};
 //!
 //! /// e^−x of one number, on all lanes of the machine.
 //! struct Transmittance(f32);
@@ -14,7 +14,7 @@
 //!
 //!     fn with_simd<S: pulp::Simd>(self, simd: S) -> f32 {
 //!         let mut out = [0.0; splat_core::raster::lanes::MAX_LANES];
-//!         Lanes::splat(simd, self.0).exp_neg().store(&mut out);
+//!         simd.lanes(self.0).exp_neg().store(&mut out);
 //!         out[0]
 //!     }
 //! }
@@ -36,6 +36,17 @@ pub struct Lanes<S: Simd> {
     value: S::f32s,
 }
 
+/// The same number in all lanes. A method of what tells the instruction set: a closure that is called some times may stay a call, and what it calls, too.
+pub trait Broadcast: Simd {
+    /// `value` in all lanes.
+    #[inline(always)]
+    fn lanes(self, value: f32) -> Lanes<Self> {
+        Lanes { simd: self, value: self.splat_f32s(value) }
+    }
+}
+
+impl<S: Simd> Broadcast for S {}
+
 macro_rules! operator {
     ($($trait:ident $method:ident $instruction:ident),*) => {$(
         impl<S: Simd> $trait for Lanes<S> {
@@ -53,12 +64,6 @@ operator!(Add add add_f32s, Sub sub sub_f32s, Mul mul mul_f32s, Div div div_f32s
 impl<S: Simd> Lanes<S> {
     /// Lanes of this instruction set.
     pub const COUNT: usize = S::F32_LANES;
-
-    /// The same number in all lanes.
-    #[inline(always)]
-    pub fn splat(simd: S, value: f32) -> Self {
-        Self { simd, value: simd.splat_f32s(value) }
-    }
 
     /// The first lanes of `from`.
     ///
@@ -140,46 +145,45 @@ impl<S: Simd> Lanes<S> {
     /// `self` where `a` < `b`, 0 elsewhere.
     #[inline(always)]
     pub fn where_less(self, a: Self, b: Self) -> Self {
-        self.where_less_or(a, b, Self::splat(self.simd, 0.0))
+        self.where_less_or(a, b, self.simd.lanes(0.0))
     }
 
     /// e^−x for x ≥ 0, as [`exp_neg`] in every bit.
     #[inline(always)]
     pub fn exp_neg(self) -> Self {
         let simd = self.simd;
-        let lanes = |v| Self::splat(simd, v);
-        let t = (self * lanes(-std::f32::consts::LOG2_E)).max(lanes(-127.0));
-        let shifted = t + lanes(MAGIC);
-        let f = t - (shifted - lanes(MAGIC));
+        let t = (self * simd.lanes(-std::f32::consts::LOG2_E)).max(simd.lanes(-127.0));
+        let shifted = t + simd.lanes(MAGIC);
+        let f = t - (shifted - simd.lanes(MAGIC));
         let g = f * f;
-        let high = (lanes(EXP2[4]) + lanes(EXP2[5]) * f) + lanes(EXP2[6]) * g;
-        let p = (lanes(EXP2[0]) + lanes(EXP2[1]) * f) + g * ((lanes(EXP2[2]) + lanes(EXP2[3]) * f) + g * high);
+        let high = (simd.lanes(EXP2[4]) + simd.lanes(EXP2[5]) * f) + simd.lanes(EXP2[6]) * g;
+        let p = (simd.lanes(EXP2[0]) + simd.lanes(EXP2[1]) * f)
+            + g * ((simd.lanes(EXP2[2]) + simd.lanes(EXP2[3]) * f) + g * high);
         let exponent = simd.wrapping_dyn_shl_u32s(shifted.bits(), simd.splat_u32s(23));
         let bits = simd.add_u32s(p.bits(), exponent);
-        Self::from_bits(simd, bits).where_less(lanes(-126.0), t)
+        Self::from_bits(simd, bits).where_less(simd.lanes(-126.0), t)
     }
 
     /// The natural logarithm of a normal number > 0: an error below 2·10⁻⁷ of it, or of 10⁻⁷ near 1.
     #[inline(always)]
     pub fn logarithm(self) -> Self {
         let simd = self.simd;
-        let lanes = |v| Self::splat(simd, v);
         // Bits of 1/√2, so that what is left of the number lies around 1; 127 more make the exponent a natural number.
-        let whole = |v: u32| simd.splat_u32s(v);
-        let above = simd.add_u32s(self.bits(), whole((127 << 23) - 0x3f35_04f3));
-        let exponent = simd.wrapping_dyn_shr_u32s(above, whole(23));
-        let scale = simd.wrapping_dyn_shl_u32s(simd.sub_u32s(exponent, whole(127)), whole(23));
+        let above = simd.add_u32s(self.bits(), simd.splat_u32s((127 << 23) - 0x3f35_04f3));
+        let exponent = simd.wrapping_dyn_shr_u32s(above, simd.splat_u32s(23));
+        let scale = simd.wrapping_dyn_shl_u32s(simd.sub_u32s(exponent, simd.splat_u32s(127)), simd.splat_u32s(23));
         let rest = simd.sub_u32s(self.bits(), scale);
         // The bits of 2²³ and a natural number below are those of their sum.
-        let exponent = Self::from_bits(simd, simd.add_u32s(exponent, whole(0x4b00_0000))) - lanes(8_388_608.0 + 127.0);
-        let f = Self::from_bits(simd, rest) - lanes(1.0);
-        let mut p = lanes(LN[0]);
+        let exponent = Self::from_bits(simd, simd.add_u32s(exponent, simd.splat_u32s(0x4b00_0000)))
+            - simd.lanes(8_388_608.0 + 127.0);
+        let f = Self::from_bits(simd, rest) - simd.lanes(1.0);
+        let mut p = simd.lanes(LN[0]);
         for c in &LN[1..] {
-            p = p.mul_add(f, lanes(*c));
+            p = p.mul_add(f, simd.lanes(*c));
         }
         let square = f * f;
-        let low = exponent.mul_add(lanes(LN_2[1]), p * f * square) - lanes(0.5) * square;
-        exponent.mul_add(lanes(LN_2[0]), f + low)
+        let low = exponent.mul_add(simd.lanes(LN_2[1]), p * f * square) - simd.lanes(0.5) * square;
+        exponent.mul_add(simd.lanes(LN_2[0]), f + low)
     }
 
     /// Whether `self` < `other` in any lane.
@@ -191,9 +195,8 @@ impl<S: Simd> Lanes<S> {
     /// 1 − e^−x for 0 ≤ x ≤ ½, relative error below 2·10⁻⁷: tiny x keep their digits.
     #[inline(always)]
     pub fn opacity_of_small(self) -> Self {
-        let lanes = |v| Self::splat(self.simd, v);
-        let low = lanes(OPACITY[1]).mul_add(self, lanes(OPACITY[0]));
-        let high = lanes(OPACITY[3]).mul_add(self, lanes(OPACITY[2]));
+        let low = self.simd.lanes(OPACITY[1]).mul_add(self, self.simd.lanes(OPACITY[0]));
+        let high = self.simd.lanes(OPACITY[3]).mul_add(self, self.simd.lanes(OPACITY[2]));
         let x2 = self * self;
         (high.mul_add(x2, low)).mul_add(x2, self)
     }
@@ -201,24 +204,24 @@ impl<S: Simd> Lanes<S> {
     /// 1 − e^−x for any x ≥ 0: [`Lanes::opacity_of_small`] where it holds, the exponential elsewhere.
     #[inline(always)]
     pub fn opacity(self) -> Self {
-        let lanes = |v| Self::splat(self.simd, v);
-        let small = self.min(lanes(SMALL)).opacity_of_small();
+        let small = self.min(self.simd.lanes(SMALL)).opacity_of_small();
         // The exponential is asked for where any lane takes it.
-        if !lanes(BELOW_SMALL).any_less(self) {
+        if !self.simd.lanes(BELOW_SMALL).any_less(self) {
             return small;
         }
-        small.where_less_or(self, lanes(SMALL), lanes(1.0) - self.exp_neg())
+        small.where_less_or(self, self.simd.lanes(SMALL), self.simd.lanes(1.0) - self.exp_neg())
     }
 
     /// Rounded to half precision (11 bits, least normal number 2⁻¹⁴), at most 65504.
     #[inline(always)]
     pub fn to_half(self) -> Self {
-        let lanes = |v| Self::splat(self.simd, v);
         // Veltkamp's splitting keeps 11 of 24 bits; below 2⁻¹⁴ the unit is 2⁻²⁴, that of a float near 0.75.
-        let scaled = self * lanes(8193.0);
+        let scaled = self * self.simd.lanes(8193.0);
         let normal = scaled - (scaled - self);
-        let tiny = (self + lanes(0.75)) - lanes(0.75);
-        tiny.where_less_or(self.abs(), lanes(1.0 / 16384.0), normal).min(lanes(65504.0)).max(lanes(-65504.0))
+        let tiny = (self + self.simd.lanes(0.75)) - self.simd.lanes(0.75);
+        tiny.where_less_or(self.abs(), self.simd.lanes(1.0 / 16384.0), normal)
+            .min(self.simd.lanes(65504.0))
+            .max(self.simd.lanes(-65504.0))
     }
 }
 
@@ -300,7 +303,7 @@ mod tests {
         type Output = Vec<f32>;
 
         fn with_simd<S: Simd>(self, simd: S) -> Vec<f32> {
-            let lanes = Lanes::splat(simd, self.0);
+            let lanes = simd.lanes(self.0);
             let mut out = [0.0; MAX_LANES];
             match self.1 {
                 Function::ExpNeg => lanes.exp_neg(),
@@ -348,7 +351,7 @@ mod tests {
 
         fn with_simd<S: Simd>(mut self, simd: S) -> bool {
             self.0[Lanes::<S>::COUNT - 1] = -1.0;
-            Lanes::load(simd, &self.0).any_less(Lanes::splat(simd, self.1))
+            Lanes::load(simd, &self.0).any_less(simd.lanes(self.1))
         }
     }
 

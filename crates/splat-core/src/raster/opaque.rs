@@ -10,7 +10,7 @@
 use super::RasterCounts;
 use super::bins::{Bins, TILE, bin};
 use super::kernel::Kernel;
-use super::lanes::{Lanes, MAX_LANES};
+use super::lanes::{Broadcast, Lanes, MAX_LANES};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::source::Source;
 use super::special;
@@ -87,8 +87,7 @@ impl Disc<'_> {
         match self.special {
             None => {
                 let s = run.distance_sq(simd, &self.splat);
-                let lanes = |v: f32| Lanes::splat(simd, v);
-                [kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0))), run.depth(simd, &self.depth)]
+                [kernel.profile(simd, (simd.lanes(1.0) - s).max(simd.lanes(0.0))), run.depth(simd, &self.depth)]
             }
             Some(disc) => special::profile(
                 simd,
@@ -428,8 +427,8 @@ impl NearestTile {
         let runs = Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]);
         self.fragments += runs.pixels();
         for run in runs {
-            let far = Lanes::splat(simd, f32::INFINITY);
-            let core = Lanes::splat(simd, CORE);
+            let far = simd.lanes(f32::INFINITY);
+            let core = simd.lanes(CORE);
             let [s, depth] = disc.core(simd, run, projected);
             let solid = depth.where_less_or(s, core, far);
             let nearest = &mut self.depth[run.pixel()..];
@@ -461,13 +460,12 @@ impl NearestTile {
         if disc.special.is_some() {
             return true;
         }
-        let lanes = |v: f32| Lanes::splat(simd, v);
         for run in Runs::new(simd, &disc.splat, projected.size, [self.x, self.y]) {
             self.fragments += Lanes::<S>::COUNT as u64;
             let behind = run.depth(simd, &disc.depth) - Lanes::load(simd, &self.depth[run.pixel()..]);
-            let inside = lanes(1.0) - run.distance_sq(simd, &disc.splat);
-            let near = inside.where_less(behind.abs(), lanes(EPSILON_Z * disc.depth.extent));
-            if lanes(0.0).any_less(near) {
+            let inside = simd.lanes(1.0) - run.distance_sq(simd, &disc.splat);
+            let near = inside.where_less(behind.abs(), simd.lanes(EPSILON_Z * disc.depth.extent));
+            if simd.lanes(0.0).any_less(near) {
                 return true;
             }
         }
@@ -490,7 +488,6 @@ impl BlendedTile {
         disc: &Disc<'_>,
         values: &[f32],
     ) {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let runs = Runs::new(simd, &disc.splat, projected.size, [surface.x, surface.y]);
         self.fragments += runs.pixels();
         for run in runs {
@@ -499,15 +496,15 @@ impl BlendedTile {
             // Behind by how much; where there is no surface −∞, and nothing counts. Before it lie the rims of nearer surfaces.
             let [profile, depth] = disc.profile(simd, run, projected.kernel(&disc.splat), projected);
             let behind = depth - nearest;
-            let amount = lanes(disc.splat.peak) * profile;
-            let near = amount.where_less(behind.abs(), lanes(EPSILON_Z * disc.depth.extent));
-            let weight = near.where_less(nearest, lanes(f32::INFINITY));
+            let amount = simd.lanes(disc.splat.peak) * profile;
+            let near = amount.where_less(behind.abs(), simd.lanes(EPSILON_Z * disc.depth.extent));
+            let weight = near.where_less(nearest, simd.lanes(f32::INFINITY));
             let add = |plane: &mut [f32], v: Lanes<S>| (Lanes::load(simd, plane) + v).store(plane);
             add(&mut self.weight[k..], weight);
-            let finite = behind.where_less(nearest, lanes(f32::INFINITY));
+            let finite = behind.where_less(nearest, simd.lanes(f32::INFINITY));
             add(&mut self.depth[k..], weight * finite);
             for (c, value) in values.iter().enumerate() {
-                add(&mut self.channels[c * AREA + k..], weight * lanes(*value));
+                add(&mut self.channels[c * AREA + k..], weight * simd.lanes(*value));
             }
         }
     }

@@ -18,7 +18,7 @@
 use super::Params;
 use super::gather::{Attributes, Column, Columns};
 use super::kernel::Kernel;
-use super::lanes::Lanes;
+use super::lanes::{Broadcast, Lanes};
 use super::projected::{Coverage, Detail, Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::shapes::{Image, Shapes};
 use crate::optics::faintest;
@@ -200,8 +200,6 @@ struct Centers<S: Simd> {
 impl Projector<'_> {
     #[inline(always)]
     fn project<S: Simd>(&self, simd: S, attributes: &Attributes, image: &mut Image) {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let load = |column: &Column| Lanes::load(simd, column);
         let centers = self.centers(simd, attributes);
         let shapes = match (attributes.any_medium, attributes.any_disc) {
             (_, false) => self.media(simd, attributes, &centers),
@@ -209,16 +207,16 @@ impl Projector<'_> {
             (true, true) => {
                 let media = self.media(simd, attributes, &centers);
                 let discs = self.discs(simd, attributes, &centers);
-                media.where_less(load(&attributes.disc), lanes(0.0), &discs)
+                media.where_less(Lanes::load(simd, &attributes.disc), simd.lanes(0.0), &discs)
             }
         };
         let [x, y, z] = centers.position;
-        (lanes(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
-        (lanes(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
+        (simd.lanes(self.half.x) + x * centers.px_per_world).store(&mut image.center[0]);
+        (simd.lanes(self.half.y) - y * centers.px_per_world).store(&mut image.center[1]);
         // Where a ray meets a disc through the eye plane is told from where that is seen.
-        z.where_less_or(lanes(0.0), shapes.near, centers.before).store(&mut image.depth);
+        z.where_less_or(simd.lanes(0.0), shapes.near, centers.before).store(&mut image.depth);
         // Comparisons with NaN are false: what is no number has no image.
-        shapes.peak.where_less(lanes(0.0), shapes.peak).store(&mut image.peak);
+        shapes.peak.where_less(simd.lanes(0.0), shapes.peak).store(&mut image.peak);
         shapes.near.store(&mut image.near);
         for k in 0..3 {
             shapes.conic[k].store(&mut image.conic[k]);
@@ -232,28 +230,27 @@ impl Projector<'_> {
 
     #[inline(always)]
     fn centers<S: Simd>(&self, simd: S, attributes: &Attributes) -> Centers<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let position = self.rotate(simd, &attributes.position);
         let t = self.view.translation;
-        let position = [position[0] + lanes(t.x), position[1] + lanes(t.y), position[2] + lanes(t.z)];
+        let position = [position[0] + simd.lanes(t.x), position[1] + simd.lanes(t.y), position[2] + simd.lanes(t.z)];
         let [x, y, z] = position;
-        let filter_px = Lanes::load(simd, &attributes.cutoff) * lanes(self.filter_sigma_px);
+        let filter_px = Lanes::load(simd, &attributes.cutoff) * simd.lanes(self.filter_sigma_px);
         if self.orthographic {
             return Centers {
                 position,
                 before: z,
-                px_per_world: lanes(self.focal),
-                u: lanes(0.0),
-                v: lanes(0.0),
+                px_per_world: simd.lanes(self.focal),
+                u: simd.lanes(0.0),
+                v: simd.lanes(0.0),
                 filter_px,
             };
         }
         let before = z;
-        let least = Lanes::load(simd, &attributes.radius) * lanes(LEAST_DEPTH);
-        let side = (lanes(0.0) - least).where_less_or(z, lanes(0.0), least);
+        let least = Lanes::load(simd, &attributes.radius) * simd.lanes(LEAST_DEPTH);
+        let side = (simd.lanes(0.0) - least).where_less_or(z, simd.lanes(0.0), least);
         let z = side.where_less_or(z.abs(), least, z);
         let position = [x, y, z];
-        Centers { before, position, px_per_world: lanes(self.focal) / z, u: x / z, v: y / z, filter_px }
+        Centers { before, position, px_per_world: simd.lanes(self.focal) / z, u: x / z, v: y / z, filter_px }
     }
 
     /// Into view space, in the order of operations of [`ViewTransform::depth`].
@@ -263,8 +260,7 @@ impl Projector<'_> {
         let x = Lanes::load(simd, &v[0]);
         let y = Lanes::load(simd, &v[1]);
         let z = Lanes::load(simd, &v[2]);
-        let row =
-            |a: f32, b: f32, c: f32| Lanes::splat(simd, a) * x + Lanes::splat(simd, b) * y + Lanes::splat(simd, c) * z;
+        let row = |a: f32, b: f32, c: f32| simd.lanes(a) * x + simd.lanes(b) * y + simd.lanes(c) * z;
         [
             row(m.x_axis.x, m.y_axis.x, m.z_axis.x),
             row(m.x_axis.y, m.y_axis.y, m.z_axis.y),
@@ -274,31 +270,29 @@ impl Projector<'_> {
 
     #[inline(always)]
     fn media<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let load = |column: &Column| Lanes::load(simd, column);
         let Centers { px_per_world, u, v, filter_px, .. } = *centers;
-        let radius = load(&attributes.radius);
+        let radius = Lanes::load(simd, &attributes.radius);
         let filter_world = filter_px / px_per_world;
         let radius_sq = radius * radius + filter_world * filter_world;
         let reach_sq = px_per_world * px_per_world * radius_sq;
-        let scale = lanes(1.0) / reach_sq;
-        let x_sq = lanes(1.0) + u * u;
-        let y_sq = lanes(1.0) + v * v;
-        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq;
+        let scale = simd.lanes(1.0) / reach_sq;
+        let x_sq = simd.lanes(1.0) + u * u;
+        let y_sq = simd.lanes(1.0) + v * v;
+        let mut peak = Lanes::load(simd, &attributes.cross_section) * Lanes::load(simd, &attributes.norm) / radius_sq;
         let mut half_extent = [reach_sq.sqrt(); 2];
         if !self.orthographic {
-            let ratio_sq = reach_sq / lanes(self.focal * self.focal);
+            let ratio_sq = reach_sq / simd.lanes(self.focal * self.focal);
             half_extent = [self.extent_of_ball(simd, u, x_sq, ratio_sq), self.extent_of_ball(simd, v, y_sq, ratio_sq)];
             peak = self.in_view(simd, centers, radius_sq.sqrt(), peak);
         }
         Shapes {
             // y runs down in the image, so the mixed term changes its sign.
-            conic: [y_sq * scale, lanes(2.0) * (u * v * scale), x_sq * scale],
+            conic: [y_sq * scale, simd.lanes(2.0) * (u * v * scale), x_sq * scale],
             peak,
             half_extent,
-            slope: [lanes(1.0) / (radius * load(&attributes.half_width)), lanes(1.0)],
-            core: [lanes(0.0); 3],
-            near: lanes(-1.0),
+            slope: [simd.lanes(1.0) / (radius * Lanes::load(simd, &attributes.half_width)), simd.lanes(1.0)],
+            core: [simd.lanes(0.0); 3],
+            near: simd.lanes(-1.0),
         }
     }
 
@@ -310,7 +304,7 @@ impl Projector<'_> {
             // Comparisons with NaN are false.
             if attributes.disc[l] < 0.0 && distance < 1.0 && image.peak[l] > 0.0 {
                 let mut front = Column::default();
-                self.kernel_of(first + l).share_before(simd, Lanes::splat(simd, distance)).store(&mut front);
+                self.kernel_of(first + l).share_before(simd, simd.lanes(distance)).store(&mut front);
                 image.peak[l] *= front[0];
                 image.slope[1][l] = 1.0 / front[0];
             }
@@ -326,10 +320,9 @@ impl Projector<'_> {
     /// `ratio_sq` (R/z)². Everything where the ball reaches the eye plane.
     #[inline(always)]
     fn extent_of_ball<S: Simd>(&self, simd: S, slope: Lanes<S>, length_sq: Lanes<S>, ratio_sq: Lanes<S>) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let across = (ratio_sq * (length_sq - ratio_sq)).sqrt();
-        let extent = (slope.abs() * ratio_sq + across) / (lanes(1.0) - ratio_sq) * lanes(self.focal);
-        extent.where_less_or(ratio_sq, lanes(1.0), lanes(f32::INFINITY))
+        let extent = (slope.abs() * ratio_sq + across) / (simd.lanes(1.0) - ratio_sq) * simd.lanes(self.focal);
+        extent.where_less_or(ratio_sq, simd.lanes(1.0), simd.lanes(f32::INFINITY))
     }
 
     /// `peak` where a ball about the centre, or about its mirror image at the eye, reaches into the image; else 0.
@@ -338,16 +331,14 @@ impl Projector<'_> {
         let [x, y, z] = centers.position;
         let mut peak = peak;
         for (v, reach) in [(x, self.reach.x), (y, self.reach.y)] {
-            let outside = v.abs() - z.abs() * Lanes::splat(simd, reach);
-            peak = peak.where_less(outside, radius * Lanes::splat(simd, (1.0 + reach * reach).sqrt()));
+            let outside = v.abs() - z.abs() * simd.lanes(reach);
+            peak = peak.where_less(outside, radius * simd.lanes((1.0 + reach * reach).sqrt()));
         }
         peak
     }
 
     #[inline(always)]
     fn discs<S: Simd>(&self, simd: S, attributes: &Attributes, centers: &Centers<S>) -> Shapes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let load = |column: &Column| Lanes::load(simd, column);
         let Centers { px_per_world, u, v, filter_px, .. } = *centers;
         let normal = self.rotate(simd, &attributes.normal);
         let (axis_u, axis_v) = self.disc_axes(simd, attributes, normal);
@@ -363,39 +354,40 @@ impl Projector<'_> {
         let mixed = ju[0] * ju[1] + jv[0] * jv[1];
         // (J Jᵀ + filter)⁻¹, its determinant |J|² + filter²·trace(JJᵀ) + filter⁴ written so that an edge-on disc does not
         // cancel.
-        let core_filter_sq = lanes(CORE_FILTER_PX * CORE_FILTER_PX);
+        let core_filter_sq = simd.lanes(CORE_FILTER_PX * CORE_FILTER_PX);
         let trace = trace_x + trace_y;
-        let core_inverse = lanes(1.0) / (area_sq + core_filter_sq * trace + core_filter_sq * core_filter_sq);
+        let core_inverse = simd.lanes(1.0) / (area_sq + core_filter_sq * trace + core_filter_sq * core_filter_sq);
         let core = [
             (trace_y + core_filter_sq) * core_inverse,
-            lanes(-2.0) * (mixed * core_inverse),
+            simd.lanes(-2.0) * (mixed * core_inverse),
             (trace_x + core_filter_sq) * core_inverse,
         ];
         let xx = trace_x + filter_sq;
         let yy = trace_y + filter_sq;
-        let inverse = lanes(1.0) / (area_sq + filter_sq * trace + filter_sq * filter_sq);
-        let conic = [yy * inverse, lanes(-2.0) * (mixed * inverse), xx * inverse];
+        let inverse = simd.lanes(1.0) / (area_sq + filter_sq * trace + filter_sq * filter_sq);
+        let conic = [yy * inverse, simd.lanes(-2.0) * (mixed * inverse), xx * inverse];
         let radius_sq = dot(axis_u, axis_u).sqrt() * dot(axis_v, axis_v).sqrt();
         // The filter spreads the same optical depth over a larger image area.
         let spread = (area_sq * inverse).sqrt();
-        let mut peak = load(&attributes.cross_section) * load(&attributes.norm) / radius_sq * spread;
+        let mut peak =
+            Lanes::load(simd, &attributes.cross_section) * Lanes::load(simd, &attributes.norm) / radius_sq * spread;
         // A slab is thicker along a slanted ray; one over |cos| is cut as `SurfaceOpacity` cuts it.
         let (along, length) = if self.orthographic {
-            (normal[2], lanes(1.0))
+            (normal[2], simd.lanes(1.0))
         } else {
-            (dot(normal, [u, v, lanes(1.0)]), (u * u + v * v + lanes(1.0)).sqrt())
+            (dot(normal, [u, v, simd.lanes(1.0)]), (u * u + v * v + simd.lanes(1.0)).sqrt())
         };
-        let slab = peak / (along.abs() / length).max(lanes(1e-3));
-        peak = slab.where_less_or(load(&attributes.crossing), lanes(0.0), peak);
+        let slab = peak / (along.abs() / length).max(simd.lanes(1e-3));
+        peak = slab.where_less_or(Lanes::load(simd, &attributes.crossing), simd.lanes(0.0), peak);
         // The side of the plane that the eye is on: for a centre behind the eye `along` has the other sign.
         let facing = if self.orthographic { along } else { along * centers.position[2] };
-        let away = lanes(FACING_AWAY).where_less_or(lanes(0.0), facing, lanes(1.0));
-        peak = peak * away.where_less_or(load(&attributes.opaque), lanes(0.0), lanes(1.0));
+        let away = simd.lanes(FACING_AWAY).where_less_or(simd.lanes(0.0), facing, simd.lanes(1.0));
+        peak = peak * away.where_less_or(Lanes::load(simd, &attributes.opaque), simd.lanes(0.0), simd.lanes(1.0));
         let (near, half_extent, peak) = self.near_discs(simd, centers, [axis_u, axis_v], [xx.sqrt(), yy.sqrt()], peak);
         // An edge-on plane has no slope that could be used; its fragments stay at the centre's depth.
-        let per_px = lanes(1.0) / (along * px_per_world);
-        let right = (lanes(0.0) - normal[0] * per_px).where_less(lanes(1e-4), along.abs());
-        let down = (normal[1] * per_px).where_less(lanes(1e-4), along.abs());
+        let per_px = simd.lanes(1.0) / (along * px_per_world);
+        let right = (simd.lanes(0.0) - normal[0] * per_px).where_less(simd.lanes(1e-4), along.abs());
+        let down = (normal[1] * per_px).where_less(simd.lanes(1e-4), along.abs());
         Shapes { conic, core, peak, half_extent, slope: [right, down], near }
     }
 
@@ -410,18 +402,17 @@ impl Projector<'_> {
         half_extent: [Lanes<S>; 2],
         peak: Lanes<S>,
     ) -> (Lanes<S>, [Lanes<S>; 2], Lanes<S>) {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let z = centers.before;
         let along = (axes[0][2] * axes[0][2] + axes[1][2] * axes[1][2]).sqrt();
-        let peak = peak.where_less(lanes(0.0), z + along);
+        let peak = peak.where_less(simd.lanes(0.0), z + along);
         if self.orthographic {
-            return (lanes(1.0).where_less_or(z, along, lanes(-1.0)), half_extent, peak);
+            return (simd.lanes(1.0).where_less_or(z, along, simd.lanes(-1.0)), half_extent, peak);
         }
         let radius = dot(axes[0], axes[0]).max(dot(axes[1], axes[1])).sqrt();
-        let far = lanes(f32::INFINITY);
+        let far = simd.lanes(f32::INFINITY);
         let half_extent = [far.where_less_or(z, radius, half_extent[0]), far.where_less_or(z, radius, half_extent[1])];
         let seen = self.in_view(simd, centers, radius, peak).where_less_or(z, radius, peak);
-        (lanes(1.0).where_less_or(z, radius, lanes(-1.0)), half_extent, seen)
+        (simd.lanes(1.0).where_less_or(z, radius, simd.lanes(-1.0)), half_extent, seen)
     }
 
     /// Semi-axes of the discs in view space.
@@ -432,24 +423,23 @@ impl Projector<'_> {
         attributes: &Attributes,
         normal: [Lanes<S>; 3],
     ) -> ([Lanes<S>; 3], [Lanes<S>; 3]) {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let radius = Lanes::load(simd, &attributes.radius);
         // Two vectors across the normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
         let [x, y, z] = normal;
-        let sign = lanes(-1.0).where_less_or(z, lanes(0.0), lanes(1.0));
-        let a = lanes(-1.0) / (sign + z);
+        let sign = simd.lanes(-1.0).where_less_or(z, simd.lanes(0.0), simd.lanes(1.0));
+        let a = simd.lanes(-1.0) / (sign + z);
         let b = x * y * a;
-        let mut axis_u = [b * radius, (sign + y * y * a) * radius, (lanes(0.0) - y) * radius];
+        let mut axis_u = [b * radius, (sign + y * y * a) * radius, (simd.lanes(0.0) - y) * radius];
         if attributes.any_tangent {
             let tangent = self.rotate(simd, &attributes.tangent);
             let elliptical = tangent[0].abs().max(tangent[1].abs()).max(tangent[2].abs());
             for k in 0..3 {
-                axis_u[k] = tangent[k].where_less_or(lanes(0.0), elliptical, axis_u[k]);
+                axis_u[k] = tangent[k].where_less_or(simd.lanes(0.0), elliptical, axis_u[k]);
             }
         }
         let across = cross(normal, axis_u);
         let length = dot(across, across).sqrt();
-        let scale = (radius / length).where_less(lanes(0.0), length);
+        let scale = (radius / length).where_less(simd.lanes(0.0), length);
         (axis_u, [across[0] * scale, across[1] * scale, across[2] * scale])
     }
 

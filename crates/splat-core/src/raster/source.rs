@@ -2,7 +2,7 @@
 
 use super::gaussian;
 use super::kernel::Kernel;
-use super::lanes::Lanes;
+use super::lanes::{Broadcast, Lanes};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat, SpecialDisc};
 use super::special;
 use super::tile::{Run, tile_of};
@@ -138,18 +138,16 @@ impl<'a> Source<'a> {
     /// τ by the kernel alone, from s as [`Run::distance_sq`] has it.
     #[inline(always)]
     pub(crate) fn of_kernel<S: Simd>(&self, simd: S, s: Lanes<S>, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let t = if self.splat.kind == SplatKind::Medium {
-            s.negate_mul_add(rays.factors(simd, run), lanes(1.0))
+            s.negate_mul_add(rays.factors(simd, run), simd.lanes(1.0))
         } else {
-            lanes(1.0) - s
+            simd.lanes(1.0) - s
         };
-        lanes(self.splat.peak) * self.kernel.profile(simd, t.max(lanes(0.0)))
+        simd.lanes(self.splat.peak) * self.kernel.profile(simd, t.max(simd.lanes(0.0)))
     }
 
     #[inline(always)]
     fn before_the_eye<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let medium = self.splat.kind == SplatKind::Medium;
         let mut tau = self.of_kernel(simd, run.distance_sq(simd, self.splat), run, rays);
         if self.is_met && !rays.opaque.is_empty() {
@@ -157,9 +155,9 @@ impl<'a> Source<'a> {
             tau = if medium {
                 // What is seen is the part between the eye and the surface, as a share of all before the eye.
                 let [per_depth, per_front] = self.depth.slope;
-                let distance = (opaque - lanes(self.depth.center)) * lanes(per_depth);
-                let behind = lanes(1.0) - self.kernel.share_before(simd, distance);
-                tau * behind.negate_mul_add(lanes(per_front), lanes(1.0)).max(lanes(0.0))
+                let distance = (opaque - simd.lanes(self.depth.center)) * simd.lanes(per_depth);
+                let behind = simd.lanes(1.0) - self.kernel.share_before(simd, distance);
+                tau * behind.negate_mul_add(simd.lanes(per_front), simd.lanes(1.0)).max(simd.lanes(0.0))
             } else {
                 tau.where_less(run.depth(simd, &self.depth), opaque)
             };
@@ -174,18 +172,17 @@ impl<'a> Source<'a> {
             return tau;
         }
         let before = Lanes::load(simd, &rays.opaque[run.pixel()..]) - run.depth(simd, &self.depth);
-        tau * self.kernel.share_before(simd, before * Lanes::splat(simd, self.depth.core[0]))
+        tau * self.kernel.share_before(simd, before * simd.lanes(self.depth.core[0]))
     }
 
     #[inline(always)]
     fn of_special<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays, disc: &SpecialDisc) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let [profile, depth] = special::profile(simd, run, self.splat, disc, self.kernel, rays.is_perspective);
-        let mut tau = lanes(self.splat.peak) * profile;
+        let mut tau = simd.lanes(self.splat.peak) * profile;
         if disc.slab[1] > 0.0 && rays.is_perspective {
-            let w = lanes(disc.center) / depth;
+            let w = simd.lanes(disc.center) / depth;
             let ray = rays.factors(simd, run).sqrt();
-            tau = tau * lanes(disc.slab[1]) / ((lanes(disc.slab[0]) * w).abs() * ray).max(lanes(1e-3));
+            tau = tau * simd.lanes(disc.slab[1]) / ((simd.lanes(disc.slab[0]) * w).abs() * ray).max(simd.lanes(1e-3));
         }
         if !rays.opaque.is_empty() {
             tau = tau.where_less(depth, Lanes::load(simd, &rays.opaque[run.pixel()..]));
@@ -200,7 +197,7 @@ impl<'a> Source<'a> {
     pub fn view_depth<S: Simd>(&self, simd: S, run: Run<S>, rays: &TileRays) -> Lanes<S> {
         match self.special {
             Some(disc) => run.meet(simd, self.splat, disc, rays.is_perspective)[1],
-            None if self.splat.kind == SplatKind::Medium => Lanes::splat(simd, self.depth.center.max(0.0)),
+            None if self.splat.kind == SplatKind::Medium => simd.lanes(self.depth.center.max(0.0)),
             None => run.depth(simd, &self.depth),
         }
     }

@@ -7,7 +7,7 @@
 
 use super::gather::Attributes;
 use super::kernel::Kernel;
-use super::lanes::{Lanes, MAX_LANES};
+use super::lanes::{Broadcast, Lanes, MAX_LANES};
 use super::project::Projector;
 use super::projected::{Coverage, ImageFrame, ProjectedSplat, SpecialDisc};
 use super::shapes::Image;
@@ -193,9 +193,8 @@ impl<S: Simd> pulp::NullaryFnOnce for Shown<'_, S> {
     #[inline(always)]
     fn call(self) -> [Lanes<S>; 2] {
         let Self { simd, run, splat, disc, kernel, perspective, asked } = self;
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let [s, depth] = run.meet(simd, splat, disc, perspective);
-        let formula = kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0)));
+        let formula = kernel.profile(simd, (simd.lanes(1.0) - s).max(simd.lanes(0.0)));
         let (Some(pattern), Some(frame)) = (&kernel.pattern, &disc.image) else {
             return match asked {
                 Asked::Profile => [formula, depth],
@@ -222,7 +221,7 @@ impl<S: Simd> pulp::NullaryFnOnce for Shown<'_, S> {
         let seen = Lanes::load(simd, &out);
         match asked {
             Asked::Profile => [seen, depth],
-            Asked::Solid => [lanes(1.0).where_less_or(seen, lanes(1.0), lanes(0.0)), depth],
+            Asked::Solid => [simd.lanes(1.0).where_less_or(seen, simd.lanes(1.0), simd.lanes(0.0)), depth],
         }
     }
 }

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use splat_core::raster::{Detail, Params, ProjectInput, Projected, project, pulp};
-//! use splat_core::raster::{bins::{Bins, bin}, lanes::Lanes, tile::{AREA, Runs}};
+//! use splat_core::raster::{bins::{Bins, bin}, lanes::{Broadcast, Lanes}, tile::{AREA, Runs}};
 //! use splat_core::{Camera, Cloud, FootprintStack, Material, Projection, Splat, glam::DVec3};
 //!
 //! /// The sum of all optical depths in a tile.
@@ -20,7 +20,6 @@
 //!     fn with_simd<S: pulp::Simd>(self, simd: S) -> f32 {
 //!         let Self(projected, bins, t) = self;
 //!         let corner = bins.corner(t);
-//!         let lanes = |v: f32| Lanes::splat(simd, v);
 //!         let mut plane = vec![0.0; AREA];
 //!         let factors = projected.ray_factors(corner);
 //!         for &id in bins.tile(t).flatten() {
@@ -28,7 +27,7 @@
 //!             for run in Runs::new(simd, splat, projected.size, corner) {
 //!                 let s = run.distance_sq(simd, splat) * Lanes::load(simd, &factors[run.pixel()..]);
 //!                 let kernel = projected.kernel(splat);
-//!                 let tau = lanes(splat.peak) * kernel.profile(simd, (lanes(1.0) - s).max(lanes(0.0)));
+//!                 let tau = simd.lanes(splat.peak) * kernel.profile(simd, (simd.lanes(1.0) - s).max(simd.lanes(0.0)));
 //!                 (Lanes::load(simd, &plane[run.pixel()..]) + tau).store(&mut plane[run.pixel()..]);
 //!             }
 //!         }
@@ -52,7 +51,7 @@
 //! ```
 
 use super::bins::TILE;
-use super::lanes::{Lanes, MAX_LANES};
+use super::lanes::{Broadcast, Lanes, MAX_LANES};
 use super::projected::{ProjectedDepth, ProjectedSplat, SpecialDisc};
 use pulp::Simd;
 
@@ -159,7 +158,6 @@ impl Conic {
     /// Of a splat, where its runs are.
     #[inline(always)]
     pub(crate) fn fill<S: Simd>(&mut self, simd: S, splat: &ProjectedSplat, runs: &Runs<S>) {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let rows = runs.y..runs.y + runs.blocks / (runs.x1 - runs.x0).max(1);
         for lane in (0..PIXELS).step_by(Lanes::<S>::COUNT) {
             for x in runs.x0..runs.x1 {
@@ -167,8 +165,8 @@ impl Conic {
             }
             for y in rows.clone() {
                 let dy = offset(simd, runs.origin[1], y, &Y[lane..]);
-                (lanes(splat.conic[1]) * dy).store(&mut self.mixed[y % COLUMNS].0[lane..]);
-                (lanes(splat.conic[2]) * dy * dy).store(&mut self.square[y % COLUMNS].0[lane..]);
+                (simd.lanes(splat.conic[1]) * dy).store(&mut self.mixed[y % COLUMNS].0[lane..]);
+                (simd.lanes(splat.conic[2]) * dy * dy).store(&mut self.square[y % COLUMNS].0[lane..]);
             }
         }
     }
@@ -177,8 +175,8 @@ impl Conic {
 /// Distances of some pixels of the `block`-th column or row from a splat's centre, from that of the tile's first pixel.
 #[inline(always)]
 fn offset<S: Simd>(simd: S, origin: f32, block: usize, within: &[f32]) -> Lanes<S> {
-    let place = Lanes::splat(simd, (BLOCK * block) as f32) + Lanes::load(simd, within);
-    Lanes::splat(simd, origin) + place
+    let place = simd.lanes((BLOCK * block) as f32) + Lanes::load(simd, within);
+    simd.lanes(origin) + place
 }
 
 impl<S: Simd> Iterator for Runs<S> {
@@ -223,9 +221,8 @@ impl<S: Simd> Run<S> {
     /// s of each pixel; for a medium in perspective yet to be multiplied by the pixel's 1/|d|².
     #[inline(always)]
     pub fn distance_sq(&self, simd: S, splat: &ProjectedSplat) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let along = lanes(splat.conic[0]).mul_add(self.dx, lanes(splat.conic[1]) * self.dy);
-        along.mul_add(self.dx, lanes(splat.conic[2]) * self.dy * self.dy)
+        let along = simd.lanes(splat.conic[0]).mul_add(self.dx, simd.lanes(splat.conic[1]) * self.dy);
+        along.mul_add(self.dx, simd.lanes(splat.conic[2]) * self.dy * self.dy)
     }
 
     /// [`Run::distance_sq`] of the splat that `conic` was made of, bit for bit.
@@ -233,29 +230,32 @@ impl<S: Simd> Run<S> {
     pub(crate) fn distance_sq_by(&self, simd: S, splat: &ProjectedSplat, conic: &Conic) -> Lanes<S> {
         let column = self.block % COLUMNS;
         let row = self.block / COLUMNS % COLUMNS;
-        let [dx, mixed, square] = [&conic.dx[column], &conic.mixed[row], &conic.square[row]]
-            .map(|line| Lanes::load(simd, &line.0[self.lane..]));
-        let along = Lanes::splat(simd, splat.conic[0]).mul_add(dx, mixed);
+        let dx = Lanes::load(simd, &conic.dx[column].0[self.lane..]);
+        let mixed = Lanes::load(simd, &conic.mixed[row].0[self.lane..]);
+        let square = Lanes::load(simd, &conic.square[row].0[self.lane..]);
+        let along = simd.lanes(splat.conic[0]).mul_add(dx, mixed);
         along.mul_add(dx, square)
     }
 
     /// s and view depths of a special disc. Where it lies behind the eye, s is 1 and the depth the largest number.
     #[inline(always)]
     pub fn meet(&self, simd: S, splat: &ProjectedSplat, disc: &SpecialDisc, perspective: bool) -> [Lanes<S>; 2] {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let mut s = self.distance_sq(simd, splat);
         let rise = self.rise(simd, disc);
         if !disc.crosses {
-            return [s, lanes(disc.center) + rise.max(lanes(-disc.extent)).min(lanes(disc.extent))];
+            return [s, simd.lanes(disc.center) + rise.max(simd.lanes(-disc.extent)).min(simd.lanes(disc.extent))];
         }
-        let mut depth = lanes(disc.center) + rise;
+        let mut depth = simd.lanes(disc.center) + rise;
         if perspective {
-            let w = lanes(1.0) - rise / lanes(disc.center);
+            let w = simd.lanes(1.0) - rise / simd.lanes(disc.center);
             s = s / (w * w);
-            depth = lanes(disc.center) / w;
+            depth = simd.lanes(disc.center) / w;
         }
-        let depth = depth.min(lanes(f32::MAX));
-        [s.where_less_or(lanes(0.0), depth, lanes(1.0)), depth.where_less_or(lanes(0.0), depth, lanes(f32::MAX))]
+        let depth = depth.min(simd.lanes(f32::MAX));
+        [
+            s.where_less_or(simd.lanes(0.0), depth, simd.lanes(1.0)),
+            depth.where_less_or(simd.lanes(0.0), depth, simd.lanes(f32::MAX)),
+        ]
     }
 
     /// Places on a special disc in units of its semi-axes, from pixels about its centre by `to_disc`.
@@ -267,12 +267,11 @@ impl<S: Simd> Run<S> {
         disc: &SpecialDisc,
         perspective: bool,
     ) -> [[f32; MAX_LANES]; 2] {
-        let lanes = |v: f32| Lanes::splat(simd, v);
         let [a, b, c, d] = *to_disc;
-        let mut x = lanes(a) * self.dx + lanes(b) * self.dy;
-        let mut y = lanes(c) * self.dx + lanes(d) * self.dy;
+        let mut x = simd.lanes(a) * self.dx + simd.lanes(b) * self.dy;
+        let mut y = simd.lanes(c) * self.dx + simd.lanes(d) * self.dy;
         if disc.crosses && perspective {
-            let w = lanes(1.0) - self.rise(simd, disc) / lanes(disc.center);
+            let w = simd.lanes(1.0) - self.rise(simd, disc) / simd.lanes(disc.center);
             (x, y) = (x / w, y / w);
         }
         let mut places = [[0.0; MAX_LANES]; 2];
@@ -284,16 +283,14 @@ impl<S: Simd> Run<S> {
     /// How much deeper a disc lies than at its centre, as a plane seen by parallel rays.
     #[inline(always)]
     fn rise(&self, simd: S, disc: &SpecialDisc) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        lanes(disc.slope[0]) * self.dx + lanes(disc.slope[1]) * self.dy
+        simd.lanes(disc.slope[0]) * self.dx + simd.lanes(disc.slope[1]) * self.dy
     }
 
     /// View depths: the plane of a disc.
     #[inline(always)]
     pub fn depth(&self, simd: S, depth: &ProjectedDepth) -> Lanes<S> {
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let offset = lanes(depth.slope[0]) * self.dx + lanes(depth.slope[1]) * self.dy;
-        lanes(depth.center) + offset.max(lanes(-depth.extent)).min(lanes(depth.extent))
+        let offset = simd.lanes(depth.slope[0]) * self.dx + simd.lanes(depth.slope[1]) * self.dy;
+        simd.lanes(depth.center) + offset.max(simd.lanes(-depth.extent)).min(simd.lanes(depth.extent))
     }
 }
 

@@ -11,7 +11,7 @@
 //! seam where a cloud meets the ground. A disc that reaches through the eye plane counts where its plane lies before the eye.
 
 use super::bins::{Bins, bin};
-use super::lanes::{Lanes, MAX_LANES, SMALL, exp_neg};
+use super::lanes::{Broadcast, Lanes, MAX_LANES, SMALL, exp_neg};
 use super::projected::{Projected, ProjectedDepth, ProjectedSplat};
 use super::source::{Place, Source, TileRays};
 use super::tile::{BATCH, BLOCKS, Conic, Line, PIXELS, Run, Runs, for_each_span, tile_of};
@@ -452,10 +452,10 @@ impl Tile {
         let channels = if CHANNELS > 0 { CHANNELS } else { self.channels };
         let stride = 2 * PLANES + channels;
         let lines = &mut self.lines[run.block * stride..][..stride];
-        let mut weight = [Lanes::splat(simd, 0.0); PLANES];
+        let mut weight = [simd.lanes(0.0); PLANES];
         let mut nearer = weight[0];
         for p in 0..PLANES {
-            let step = tau * Lanes::splat(simd, splat.extinction[p]);
+            let step = tau * simd.lanes(splat.extinction[p]);
             let plane = &mut lines[p].0[run.lane..];
             let before = Lanes::load(simd, plane);
             if p == PLANES / 2 {
@@ -476,7 +476,7 @@ impl Tile {
         }
         for c in 0..channels {
             let p = ChannelLayout::plane_of(c, channels, PLANES);
-            let value = Lanes::splat(simd, splat.value[c]);
+            let value = simd.lanes(splat.value[c]);
             let sum = &mut lines[2 * PLANES + c].0[run.lane..];
             let before = Lanes::load(simd, sum);
             let added = if FRONT { value } else { value - before };
@@ -507,7 +507,7 @@ impl Tile {
         if source.splat.kind == SplatKind::Medium && !source.splat.is_gaussian() && !self.depth.is_empty() {
             let s = run.distance_sq(simd, source.splat) * self.rays.factors(simd, run);
             let [constant, slope] = source.kernel.narrowing;
-            let [constant, slope] = [Lanes::splat(simd, constant), Lanes::splat(simd, slope)];
+            let [constant, slope] = [simd.lanes(constant), simd.lanes(slope)];
             slope.mul_add(s, constant).store(&mut narrow);
         }
         for i in 0..Lanes::<S>::COUNT {

@@ -5,7 +5,7 @@ use super::joint::{ThickSplat, Within};
 use super::point::{Incoming, is_attenuated, passing};
 use super::{ChannelLayout, LitBy, Radiance, ShadeInput, Shaded, facing, shadow_share};
 use crate::optics::TRACE;
-use crate::raster::lanes::{Lanes, MAX_LANES};
+use crate::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use crate::{LightShape, Receiver, Shading, TOGETHER};
 use glam::{DVec3, Vec3};
 use pulp::Simd;
@@ -170,38 +170,41 @@ impl<'a> Scattering<'a> {
         }
         batch.lights.resize_with(self.sources.len(), OfLight::default);
         // Not `map`, which is not compiled into code for vectors.
-        let lanes = |v: f32| Lanes::splat(simd, v);
-        let vector = |v: Vec3| [lanes(v.x), lanes(v.y), lanes(v.z)];
+        let vector = |v: Vec3| [simd.lanes(v.x), simd.lanes(v.y), simd.lanes(v.z)];
         let scaled = |[x, y, z]: [Lanes<S>; 3], by: Lanes<S>| [x * by, y * by, z * by];
         for lane in (0..MAX_LANES).step_by(Lanes::<S>::COUNT) {
-            let load = |column: &Column| Lanes::load(simd, &column[lane..]);
-            let [x, y, z, radius] = [load(&columns[0]), load(&columns[1]), load(&columns[2]), load(&columns[3])];
+            let [x, y, z, radius] = [
+                Lanes::load(simd, &columns[0][lane..]),
+                Lanes::load(simd, &columns[1][lane..]),
+                Lanes::load(simd, &columns[2][lane..]),
+                Lanes::load(simd, &columns[3][lane..]),
+            ];
             let to_eye = if let Some(to_eye) = self.to_eye {
                 vector(to_eye)
             } else {
                 let [ex, ey, ez] = vector(self.eye);
                 let away = [ex - x, ey - y, ez - z];
                 let length = length_sq(away).sqrt();
-                scaled(away, (lanes(1.0) / length).where_less(lanes(0.0), length))
+                scaled(away, (simd.lanes(1.0) / length).where_less(simd.lanes(0.0), length))
             };
             to_eye[0].store(&mut batch.to_eye[0][lane..]);
             to_eye[1].store(&mut batch.to_eye[1][lane..]);
             to_eye[2].store(&mut batch.to_eye[2][lane..]);
             for (source, light) in self.sources.iter().zip(&mut batch.lights) {
                 let (to_light, arriving) = match *source {
-                    Source::Parallel(to_light) => (vector(to_light), lanes(1.0)),
+                    Source::Parallel(to_light) => (vector(to_light), simd.lanes(1.0)),
                     Source::Lamp([near, rest]) => {
                         let [nx, ny, nz] = vector(near);
                         let [rx, ry, rz] = vector(rest);
                         let away = [(nx - x) + rx, (ny - y) + ry, (nz - z) + rz];
-                        let spread = radius / lanes(3.0);
+                        let spread = radius / simd.lanes(3.0);
                         let distance_sq = spread.mul_add(spread, length_sq(away));
-                        let nearness = (lanes(1.0) / distance_sq.sqrt()).where_less(lanes(0.0), distance_sq);
+                        let nearness = (simd.lanes(1.0) / distance_sq.sqrt()).where_less(simd.lanes(0.0), distance_sq);
                         (scaled(away, nearness), nearness * nearness)
                     }
                 };
                 arriving.store(&mut light.falloff[lane..]);
-                (lanes(material.single_scattering_albedo) * phase(simd, to_light, to_eye, material.asymmetry))
+                (simd.lanes(material.single_scattering_albedo) * phase(simd, to_light, to_eye, material.asymmetry))
                     .store(&mut light.leaving[lane..]);
             }
         }
@@ -217,13 +220,12 @@ fn length_sq<S: Simd>(vector: [Lanes<S>; 3]) -> Lanes<S> {
 /// [`henyey_greenstein`](crate::henyey_greenstein) of light that travels away from where it comes from.
 #[inline(always)]
 fn phase<S: Simd>(simd: S, to_light: [Lanes<S>; 3], to_eye: [Lanes<S>; 3], asymmetry: f32) -> Lanes<S> {
-    let lanes = |v: f32| Lanes::splat(simd, v);
     let g = asymmetry.abs();
     let [lx, ly, lz] = to_light;
     let [ex, ey, ez] = to_eye;
     let apart = if asymmetry >= 0.0 { [lx + ex, ly + ey, lz + ez] } else { [ex - lx, ey - ly, ez - lz] };
-    let d = lanes(g).mul_add(length_sq(apart), lanes((1.0 - g) * (1.0 - g)));
-    lanes((1.0 - g) * (1.0 + g)) / (lanes(4.0 * PI) * d * d.sqrt())
+    let d = simd.lanes(g).mul_add(length_sq(apart), simd.lanes((1.0 - g) * (1.0 - g)));
+    simd.lanes((1.0 - g) * (1.0 + g)) / (simd.lanes(4.0 * PI) * d * d.sqrt())
 }
 
 #[cfg(test)]

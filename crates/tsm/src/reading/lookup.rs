@@ -17,7 +17,7 @@ use crate::shadow_map::{Absorbances, Matter};
 use crate::table::{ENOUGH, List, Lists, WINDOW};
 use glam::{Vec2, Vec3, Vec4};
 use pulp::{Simd, WithSimd};
-use splat_core::raster::lanes::{Lanes, exp_neg};
+use splat_core::raster::lanes::{Broadcast, Lanes, exp_neg};
 use splat_core::{ABOUT, Receiver, SplatKind, TOGETHER, Transmittance, glam};
 
 /// Greatest absorbance that is told: the transmittance is the least normal number of f32.
@@ -295,18 +295,17 @@ pub(crate) fn continuous<S: Simd, const C: usize>(
     distance: f32,
     ramp: f32,
 ) -> [f32; C] {
-    let lanes = |v| Lanes::splat(simd, v);
-    let place = lanes(distance);
-    let half = lanes(0.5);
-    let inverse = lanes(0.5 / ramp);
-    let none = lanes(0.0);
-    let whole = lanes(1.0);
+    let place = simd.lanes(distance);
+    let half = simd.lanes(0.5);
+    let inverse = simd.lanes(0.5 / ramp);
+    let none = simd.lanes(0.0);
+    let whole = simd.lanes(1.0);
     let mut sums = [[0.0; WINDOW]; C];
     // The last that lies wholly before stands for all before it.
     let mut n = begin.saturating_sub(1);
     while n < list.len() {
         let (at, total) = list.window(n);
-        let left = lanes((list.len() - n).min(2 * WINDOW) as f32);
+        let left = simd.lanes((list.len() - n).min(2 * WINDOW) as f32);
         for l in (0..WINDOW).step_by(Lanes::<S>::COUNT) {
             let [this, next] = [Lanes::load(simd, &at[l..]), Lanes::load(simd, &at[l + 1..])];
             // Nothing of what follows the list.

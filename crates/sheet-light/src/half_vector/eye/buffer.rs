@@ -7,7 +7,7 @@
 use crate::half_vector::slicing::band::Band;
 use crate::shared::pixel::PixelForm;
 use crate::shared::sums::add;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 use splat_core::{Accumulator, DepthFragment, DepthProfile};
@@ -101,7 +101,7 @@ impl Pixels {
     /// Puts a slab behind what is there.
     #[inline(always)]
     pub(crate) fn append<S: Simd>(&mut self, simd: S, k: usize, fragments: &Fragments) {
-        let mut weights = [Lanes::splat(simd, 0.0); 3];
+        let mut weights = [simd.lanes(0.0); 3];
         for p in 0..self.planes {
             let through = Lanes::load(simd, &self.transmittance[p][k..]);
             let opacity = Lanes::load(simd, &fragments.optical_depth[p]).opacity();
@@ -119,7 +119,7 @@ impl Pixels {
     /// Puts a slab before what is there.
     #[inline(always)]
     pub(crate) fn prepend<S: Simd>(&mut self, simd: S, k: usize, fragments: &Fragments) {
-        let mut weights = [Lanes::splat(simd, 0.0); 3];
+        let mut weights = [simd.lanes(0.0); 3];
         for p in 0..self.planes {
             weights[p] = Lanes::load(simd, &fragments.optical_depth[p]).opacity();
             self.sum(simd, p, k, fragments);

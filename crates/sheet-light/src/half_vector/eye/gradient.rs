@@ -9,7 +9,7 @@ use crate::half_vector::slicing::sheet::Sheet;
 use crate::shared::sections::LEAST_WEIGHT;
 use crate::shared::vectors::dot;
 use splat_core::glam::Vec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// Three sheets of a volume, one behind the other.
@@ -50,10 +50,9 @@ impl Gradients {
         k: usize,
     ) -> [Vec3; MAX_LANES] {
         let SheetsAround { before, here, after } = sheets;
-        let broadcast = |v: f32| Lanes::splat(simd, v);
-        let zero = broadcast(0.0);
-        let half = broadcast(0.5);
-        let one = broadcast(1.0);
+        let zero = simd.lanes(0.0);
+        let half = simd.lanes(0.5);
+        let one = simd.lanes(1.0);
         let sample = sample_at(simd, here, k, 0.0);
         let none = [sample[0], sample[1], sample[2], sample[3], zero];
         let above = if k >= stride { sample_at(simd, here, k - stride, 0.0) } else { none };
@@ -69,7 +68,7 @@ impl Gradients {
         let of_y = cross(&z, &x);
         let of_z = cross(&x, &y);
         let determinant = dot(&x, &of_x);
-        let least = broadcast(f32::MIN_POSITIVE);
+        let least = simd.lanes(f32::MIN_POSITIVE);
         let size = determinant.abs();
         let inverse = one / one.where_less_or(size, least, determinant);
         let mut gradient = [zero, zero, vz / z[2]];
@@ -79,7 +78,7 @@ impl Gradients {
         }
         // Per slab width, so that no scale of the scene makes anything vanish.
         for along in &mut gradient[..2] {
-            *along = *along * broadcast(self.width);
+            *along = *along * simd.lanes(self.width);
         }
         let mut parts = [[0.0; MAX_LANES]; 3];
         for n in 0..3 {
@@ -100,7 +99,7 @@ impl Gradients {
 /// Differences of value, a, b and s between two neighbours, each of which this sample stands for where it is outside.
 #[inline(always)]
 fn difference<S: Simd>(simd: S, here: &Sample<S>, before: &Sample<S>, after: &Sample<S>) -> [Lanes<S>; 4] {
-    let half = Lanes::splat(simd, 0.5);
+    let half = simd.lanes(0.5);
     let mut out = [half; 4];
     for n in 0..4 {
         let high = after[n].where_less_or(half, after[INSIDE], here[n]);
@@ -125,15 +124,15 @@ fn sample_at<S: Simd>(simd: S, sheet: &Sheet, k: usize, slabs: f32) -> Sample<S>
 /// Of near, far, kernel sum, value, a, b and s, of which the last is told from another sheet than its own, `slabs` behind that.
 #[inline(always)]
 fn sample<S: Simd>(simd: S, slabs: f32, planes: [&[f32]; 7]) -> Sample<S> {
-    let zero = Lanes::splat(simd, 0.0);
-    let one = Lanes::splat(simd, 1.0);
+    let zero = simd.lanes(0.0);
+    let one = simd.lanes(1.0);
     let inside = one.where_less(Lanes::load(simd, planes[0]), Lanes::load(simd, planes[1]));
-    let inside = inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), Lanes::load(simd, planes[2]));
+    let inside = inside.where_less(simd.lanes(LEAST_WEIGHT), Lanes::load(simd, planes[2]));
     let mut out = [inside; 5];
     for n in 0..INSIDE {
         out[n] = Lanes::load(simd, planes[3 + n]).where_less(zero, inside);
     }
-    out[3] = out[3] + Lanes::splat(simd, slabs);
+    out[3] = out[3] + simd.lanes(slabs);
     out
 }
 

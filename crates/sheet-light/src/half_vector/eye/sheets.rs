@@ -20,7 +20,7 @@ use crate::shared::depths::DepthSpans;
 use crate::shared::lines::{Backdrop, PixelDepths};
 use crate::shared::pixel::Pixel;
 use splat_core::glam::{DVec3, Vec3};
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 use std::ops::Range;
@@ -249,19 +249,18 @@ impl OneSlab<'_> {
     #[inline(always)]
     pub(super) fn draw<S: Simd>(&mut self, simd: S, chunk: &Chunk, share: [f32; MAX_LANES]) {
         let k = chunk.k;
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let SlabWork { geometry, splats, step, .. } = self.work;
         let slab = self.slab();
         let planes = self.eye.pixels.planes;
-        let closed = broadcast(1.0).where_less_or(
+        let closed = simd.lanes(1.0).where_less_or(
             self.eye.pixels.most(simd, k),
-            broadcast(geometry.params.transmittance_cutoff),
-            broadcast(0.0),
+            simd.lanes(geometry.params.transmittance_cutoff),
+            simd.lanes(0.0),
         );
         let stretch = Lanes::load(simd, &self.eye.band.stretch[k..]);
-        let mut optical_depth = [broadcast(0.0); 3];
-        let mut near = broadcast(f32::INFINITY);
-        let mut far = broadcast(f32::NEG_INFINITY);
+        let mut optical_depth = [simd.lanes(0.0); 3];
+        let mut near = simd.lanes(f32::INFINITY);
+        let mut far = simd.lanes(f32::NEG_INFINITY);
         let lower = Lanes::load(simd, &self.part.from);
         let upper = Lanes::load(simd, &self.part.to);
         for v in self.volumes() {
@@ -269,16 +268,16 @@ impl OneSlab<'_> {
                 continue;
             };
             let length = Lanes::load(simd, &self.eye.classified[v].depth);
-            let tau = broadcast(0.0).where_less_or(broadcast(0.5), closed, extinction * length * stretch);
+            let tau = simd.lanes(0.0).where_less_or(simd.lanes(0.5), closed, extinction * length * stretch);
             for p in 0..planes {
                 optical_depth[p] =
-                    tau.mul_add(broadcast(geometry.volumes[v].material.extinction_rgb[p]), optical_depth[p]);
+                    tau.mul_add(simd.lanes(geometry.volumes[v].material.extinction_rgb[p]), optical_depth[p]);
             }
             let sheet = self.eye.sheet(v, slab);
             let from = Lanes::load(simd, &sheet.near[k..]).max(lower);
             let to = Lanes::load(simd, &sheet.far[k..]).min(upper);
-            near = near.min(from.where_less_or(broadcast(0.0), tau, near));
-            far = far.max(to.where_less_or(broadcast(0.0), tau, far));
+            near = near.min(from.where_less_or(simd.lanes(0.0), tau, near));
+            far = far.max(to.where_less_or(simd.lanes(0.0), tau, far));
         }
         let most = optical_depth[0].max(optical_depth[1]).max(optical_depth[2]);
         let first = Pixel { x: chunk.x, y: chunk.y };
@@ -294,7 +293,7 @@ impl OneSlab<'_> {
         }
         // Lanes without any optical depth have no meaning, but are numbers.
         let medium =
-            MediumDepths { near: near.where_less(broadcast(0.0), most), far: far.where_less(broadcast(0.0), most) };
+            MediumDepths { near: near.where_less(simd.lanes(0.0), most), far: far.where_less(simd.lanes(0.0), most) };
         if is_medium && step == Step::Draw {
             self.light(simd, chunk, medium, most, &mut fragments);
         }
@@ -345,7 +344,7 @@ impl OneSlab<'_> {
         most.store(&mut is_wanted);
         let planes = self.eye.pixels.planes;
         let arrives = self.arrives(simd, chunk.k, medium, &is_wanted, out);
-        let middle = (near + far) * Lanes::splat(simd, 0.5);
+        let middle = (near + far) * simd.lanes(0.5);
         let middles = self.places(simd, chunk.k, middle);
         let places = stored(&middles);
         let mut seen = None;

@@ -22,7 +22,7 @@ use crate::shared::pixel::Pixel;
 use crate::shared::sums::rounded_one;
 use rayon::prelude::*;
 use splat_core::Camera;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 
 /// Optical depth and length so far, then what these sums are too large by.
@@ -209,7 +209,7 @@ impl pulp::WithSimd for OneBand<'_> {
                     let k = y * band.stride + x;
                     let depth = sheet.depth(simd, k, &DepthSpans::WHOLE);
                     let length = depth * Lanes::load(simd, &band.stretch[k..]);
-                    let mut extinction = Lanes::splat(simd, 0.0);
+                    let mut extinction = simd.lanes(0.0);
                     if sheet.shown[y].contains(&x) {
                         extinction = sheet.classify(simd, placed, k)[0];
                     }

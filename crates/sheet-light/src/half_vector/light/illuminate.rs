@@ -20,7 +20,7 @@ use crate::half_vector::slicing::sheet::is_any;
 use crate::half_vector::soft::buffer::Soft;
 use crate::half_vector::splats::light::SplatLight;
 use splat_core::glam::Vec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 
 /// What neighbouring pixels ask of the light.
@@ -70,16 +70,15 @@ impl Illumination<'_> {
         is_wanted: &[f32; MAX_LANES],
         planes: usize,
     ) -> [[f32; MAX_LANES]; 3] {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let RayEnds { nearer, farther } = &asked.ends;
-        let middle = asked.ends.place(broadcast(0.5));
+        let middle = asked.ends.place(simd.lanes(0.5));
         let mut soft = None;
         if let Some(buffer) = &self.buffer.soft {
             soft = Some(buffer.in_slab(simd, &middle, is_wanted, asked.lit));
         }
-        let mut optical = [[broadcast(0.0); NODES]; 3];
-        let mut bends = [broadcast(1.0); BENDS];
-        let mut is_bent = broadcast(0.0);
+        let mut optical = [[simd.lanes(0.0); NODES]; 3];
+        let mut bends = [simd.lanes(1.0); BENDS];
+        let mut is_bent = simd.lanes(0.0);
         for v in 0..self.volumes.len() {
             let mean = self.means(simd, v, &middle, asked.extinction, is_wanted);
             let ways = [self.paths[v].ways(simd, nearer, self.face), self.paths[v].ways(simd, farther, self.face)];
@@ -89,11 +88,11 @@ impl Illumination<'_> {
             self.add(simd, v, NODES - 1, &VolumeWay { ways: &ways[1], before: mean, within }, &soft, &mut optical);
             // The first volume that is seen and bends decides.
             let (at, does) = ways[0].bends(simd, &ways[1]);
-            let mut does = does.where_less(broadcast(0.0), within);
+            let mut does = does.where_less(simd.lanes(0.0), within);
             if self.paths[v].lamp.is_some() || self.volumes.len() > 1 {
                 let half = self.paths[v].ways(simd, &middle, self.face).optical_depth(simd, mean, within);
-                let line = (ends[0] + ends[1]) * broadcast(0.5);
-                does = does.max(broadcast(1.0).where_less(broadcast(CURVED), (half - line).abs()));
+                let line = (ends[0] + ends[1]) * simd.lanes(0.5);
+                does = does.max(simd.lanes(1.0).where_less(simd.lanes(CURVED), (half - line).abs()));
             }
             for n in 0..BENDS {
                 bends[n] = at[n].where_less_or(is_bent, does, bends[n]);
@@ -118,7 +117,7 @@ impl Illumination<'_> {
             let tau = Lanes::load(simd, &asked.optical_depth[p]);
             let mut mean = part(simd, tau, optical[p][0], optical[p][NODES - 1]);
             if is_any(is_bent) {
-                mean = bent(simd, tau, &bends, &optical[p]).where_less_or(broadcast(0.0), is_bent, mean);
+                mean = bent(simd, tau, &bends, &optical[p]).where_less_or(simd.lanes(0.0), is_bent, mean);
             }
             (mean / mean_of_exponential(simd, tau)).store(&mut out[p]);
         }
@@ -136,7 +135,7 @@ impl Illumination<'_> {
         soft: &Option<Soft<S>>,
         to: &mut NodeDepths<S>,
     ) {
-        let middle = asked.ends.place(Lanes::splat(simd, 0.5));
+        let middle = asked.ends.place(simd.lanes(0.5));
         for v in 0..self.volumes.len() {
             let mean = self.means(simd, v, &middle, asked.extinction, is_wanted);
             let within = Lanes::load(simd, &asked.extinction[v]);
@@ -196,7 +195,7 @@ impl Illumination<'_> {
                 None => way.ways.optical_depth(simd, way.before, way.within),
                 Some(soft) => way.ways.optical_depth(simd, way.before * soft.share[p], way.within),
             };
-            let share = Lanes::splat(simd, self.volumes[v].material.extinction_rgb[p]);
+            let share = simd.lanes(self.volumes[v].material.extinction_rgb[p]);
             to[p][node] = tau.mul_add(share, to[p][node]);
         }
     }
@@ -247,7 +246,7 @@ impl pulp::WithSimd for ThroughVolumes<'_> {
         let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
         for (chunk, (places, out)) in chunks.enumerate() {
             let (spots, is_wanted) = lanes(simd, places);
-            let mut optical = [[Lanes::splat(simd, 0.0); NODES]; 3];
+            let mut optical = [[simd.lanes(0.0); NODES]; 3];
             for v in 0..light.volumes.len() {
                 let ways = light.paths[v].ways(simd, &spots, light.face);
                 let mut amidst = [0.0; MAX_LANES];
@@ -295,8 +294,8 @@ impl pulp::WithSimd for Around<'_> {
         };
         let points = visible.len() / places.len().max(1);
         let none = vec![[0.0; MAX_LANES]; light.volumes.len()];
-        let one = Lanes::splat(simd, 1.0);
-        let zero = Lanes::splat(simd, 0.0);
+        let one = simd.lanes(1.0);
+        let zero = simd.lanes(0.0);
         let chunks = places.chunks(Lanes::<S>::COUNT).zip(out.chunks_mut(Lanes::<S>::COUNT));
         for (chunk, (places, out)) in chunks.enumerate() {
             let (spots, is_wanted) = lanes(simd, places);
@@ -306,7 +305,7 @@ impl pulp::WithSimd for Around<'_> {
                 let mean = light.means(simd, v, &spots, &none, &is_wanted);
                 let before = light.paths[v].ways(simd, &spots, light.face).optical_depth(simd, mean, zero);
                 for p in 0..3 {
-                    let share = (soft.share[p] - one) * Lanes::splat(simd, volume.material.extinction_rgb[p]);
+                    let share = (soft.share[p] - one) * simd.lanes(volume.material.extinction_rgb[p]);
                     optical[p] = before.mul_add(share, optical[p]);
                 }
             }
@@ -348,10 +347,10 @@ fn part<S: Simd>(simd: S, tau: Lanes<S>, nearer: Lanes<S>, farther: Lanes<S>) ->
 /// The same over parts that meet at the shares `bends` of the way.
 #[inline(always)]
 fn bent<S: Simd>(simd: S, tau: Lanes<S>, bends: &[Lanes<S>; BENDS], optical: &[Lanes<S>; NODES]) -> Lanes<S> {
-    let mut sum = Lanes::splat(simd, 0.0);
-    let mut from = Lanes::splat(simd, 0.0);
+    let mut sum = simd.lanes(0.0);
+    let mut from = simd.lanes(0.0);
     for n in 0..NODES - 1 {
-        let to = if n < BENDS { bends[n] } else { Lanes::splat(simd, 1.0) };
+        let to = if n < BENDS { bends[n] } else { simd.lanes(1.0) };
         let of_part = part(simd, tau * (to - from), optical[n], optical[n + 1]);
         sum = ((to - from) * (tau * from).exp_neg()).mul_add(of_part, sum);
         from = to;
@@ -362,6 +361,6 @@ fn bent<S: Simd>(simd: S, tau: Lanes<S>, bends: &[Lanes<S>; BENDS], optical: &[L
 /// φ(y) = (1 − e^(−y))/y, 1 at 0.
 #[inline(always)]
 fn mean_of_exponential<S: Simd>(simd: S, y: Lanes<S>) -> Lanes<S> {
-    let y = y.max(Lanes::splat(simd, 1e-30));
+    let y = y.max(simd.lanes(1e-30));
     y.opacity() / y
 }

@@ -10,7 +10,7 @@ use crate::half_vector::slicing::frame::Frame;
 use crate::half_vector::slicing::serves::travel;
 use splat_core::Light;
 use splat_core::glam::{DVec3, Mat3, Vec3};
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// Share of the steepest direction below which light is parallel to a pair of faces.
@@ -103,53 +103,52 @@ impl LightPath {
     /// The ways of light in the volume up to each place, of which the slab begins at depth `face`.
     #[inline(always)]
     pub(crate) fn ways<S: Simd>(&self, simd: S, places: &Places<S>, face: f32) -> Ways<S> {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
-        let zero = broadcast(0.0);
-        let tiny = broadcast(PARALLEL);
+        let zero = simd.lanes(0.0);
+        let tiny = simd.lanes(PARALLEL);
         // No closures around vectors: what is vectorised must be inlined.
         let mut here = [zero; 3];
         for a in 0..3 {
             let row = self.steps.row(a);
-            here[a] = broadcast(row.x).mul_add(
+            here[a] = simd.lanes(row.x).mul_add(
                 places[0],
-                broadcast(row.y).mul_add(places[1], broadcast(row.z).mul_add(places[2], broadcast(self.start[a]))),
+                simd.lanes(row.y).mul_add(places[1], simd.lanes(row.z).mul_add(places[2], simd.lanes(self.start[a]))),
             );
         }
         let (length, towards, across) = self.ray(simd, places, &here);
         let steepest = towards[0].abs().max(towards[1].abs()).max(towards[2].abs());
-        let mut enters = [broadcast(FAR); FACES];
+        let mut enters = [simd.lanes(FAR); FACES];
         let mut leaves = zero;
         let mut depths = [zero; FACES];
         let mut steps = [zero; FACES];
         for a in 0..3 {
-            let above = here[a] - broadcast(self.lowest[a]);
-            let below = broadcast(self.highest[a]) - here[a];
+            let above = here[a] - simd.lanes(self.lowest[a]);
+            let below = simd.lanes(self.highest[a]) - here[a];
             let rate = length / towards[a].abs().max(tiny * steepest);
             let is_parallel = [towards[a].abs(), tiny * steepest];
-            let inside = broadcast(FAR).where_less_or(broadcast(-ROUNDING), above.min(below), broadcast(-FAR));
+            let inside = simd.lanes(FAR).where_less_or(simd.lanes(-ROUNDING), above.min(below), simd.lanes(-FAR));
             (depths[a], steps[a]) = (above.where_less_or(zero, towards[a], below), towards[a].abs());
             let leave = (zero - below.where_less_or(zero, towards[a], above)) * rate;
             enters[a] = inside.where_less_or(is_parallel[0], is_parallel[1], depths[a] * rate);
             leaves = leaves.max(zero.where_less_or(is_parallel[0], is_parallel[1], leave));
         }
-        let mut cut = broadcast(FAR);
+        let mut cut = simd.lanes(FAR);
         for (normal, offset) in &self.planes {
-            let mut depth = broadcast(*offset);
+            let mut depth = simd.lanes(*offset);
             let mut step = zero;
             for a in 0..3 {
-                depth = depth - broadcast(normal[a]) * here[a];
-                step = broadcast(normal[a]).mul_add(towards[a], step);
+                depth = depth - simd.lanes(normal[a]) * here[a];
+                step = simd.lanes(normal[a]).mul_add(towards[a], step);
             }
             let along = step.abs();
             let flat = tiny * steepest;
             let distance = depth * (length / along.max(flat));
-            let enter = distance.where_less_or(step, zero, broadcast(FAR));
-            let inside = broadcast(FAR).where_less_or(broadcast(-ROUNDING), depth, broadcast(-FAR));
+            let enter = distance.where_less_or(step, zero, simd.lanes(FAR));
+            let inside = simd.lanes(FAR).where_less_or(simd.lanes(-ROUNDING), depth, simd.lanes(-FAR));
             let leave = (zero - distance).where_less(zero, step);
             cut = cut.min(inside.where_less_or(along, flat, enter));
             leaves = leaves.max(zero.where_less_or(along, flat, leave));
         }
-        (depths[SLAB], steps[SLAB]) = ((places[2] - broadcast(face)).max(zero), across);
+        (depths[SLAB], steps[SLAB]) = ((places[2] - simd.lanes(face)).max(zero), across);
         enters[SLAB] = depths[SLAB] * length / across;
         Ways { enters, cut, depths, steps, leaves }
     }
@@ -157,15 +156,14 @@ impl LightPath {
     /// Of the light's ray to each place: a length, the lattice steps on it, and the depth across the slabs.
     #[inline(always)]
     fn ray<S: Simd>(&self, simd: S, places: &Places<S>, here: &Places<S>) -> (Lanes<S>, Places<S>, Lanes<S>) {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let [x, y, z] = self.direction.to_array();
         let Some([slab, lattice]) = self.lamp else {
-            return (broadcast(1.0), [broadcast(x), broadcast(y), broadcast(z)], broadcast(self.travel.z));
+            return (simd.lanes(1.0), [simd.lanes(x), simd.lanes(y), simd.lanes(z)], simd.lanes(self.travel.z));
         };
-        let mut from = [broadcast(0.0); 3];
-        let mut towards = [broadcast(0.0); 3];
+        let mut from = [simd.lanes(0.0); 3];
+        let mut towards = [simd.lanes(0.0); 3];
         for a in 0..3 {
-            (from[a], towards[a]) = (places[a] - broadcast(slab[a]), here[a] - broadcast(lattice[a]));
+            (from[a], towards[a]) = (places[a] - simd.lanes(slab[a]), here[a] - simd.lanes(lattice[a]));
         }
         let length = from[0].mul_add(from[0], from[1].mul_add(from[1], from[2] * from[2])).sqrt();
         (length, towards, from[2])
@@ -229,7 +227,7 @@ impl<S: Simd> Ways<S> {
     /// Length of the way in the volume before the slab, and within it.
     #[inline(always)]
     fn lengths(&self, simd: S) -> [Lanes<S>; 2] {
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let in_slab = self.enters[SLAB];
         let before = (self.entered() - self.leaves.max(in_slab)).max(zero);
         [before, (self.entered().min(in_slab) - self.leaves).max(zero)]
@@ -239,7 +237,7 @@ impl<S: Simd> Ways<S> {
     #[inline(always)]
     pub(crate) fn amidst(&self, simd: S) -> Lanes<S> {
         let [_, length] = self.lengths(simd);
-        length.mul_add(Lanes::splat(simd, 0.5), self.leaves)
+        length.mul_add(simd.lanes(0.5), self.leaves)
     }
 
     /// Optical depth towards the light, of one extinction before the slab and another within it.
@@ -253,8 +251,8 @@ impl<S: Simd> Ways<S> {
     /// ascending; and 1 where they do, else 0.
     #[inline(always)]
     pub(crate) fn bends(&self, simd: S, other: &Self) -> ([Lanes<S>; BENDS], Lanes<S>) {
-        let zero = Lanes::splat(simd, 0.0);
-        let one = Lanes::splat(simd, 1.0);
+        let zero = simd.lanes(0.0);
+        let one = simd.lanes(1.0);
         let here = self.entered();
         let there = other.entered();
         // No face of the volume is the last one at both places, or only at one of them light comes into the slab later.
@@ -272,7 +270,7 @@ impl<S: Simd> Ways<S> {
             *bend = (lead / change.where_less_or(zero, change.abs(), one)).max(zero).min(one);
         }
         for n in PAIRS.len()..BENDS {
-            bends[n] = Lanes::splat(simd, (n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32);
+            bends[n] = simd.lanes((n + 1 - PAIRS.len()) as f32 / (BENDS + 1 - PAIRS.len()) as f32);
         }
         for n in 1..BENDS {
             for k in (0..n).rev() {

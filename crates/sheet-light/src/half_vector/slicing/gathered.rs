@@ -12,7 +12,7 @@ use crate::shared::lattice::Lattice;
 use crate::shared::params::GatherKernel;
 use crate::shared::voxels::Voxels;
 use splat_core::glam::DVec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// A volume whose sheets are gathered.
@@ -53,9 +53,9 @@ impl Sheet {
         band: &Band,
         faces: DepthRange,
     ) -> u64 {
-        let middle = Lanes::splat(simd, 0.5 * (faces.near + faces.far));
-        let width = Lanes::splat(simd, faces.far - faces.near);
-        let one = Lanes::splat(simd, 1.0);
+        let middle = simd.lanes(0.5 * (faces.near + faces.far));
+        let width = simd.lanes(faces.far - faces.near);
+        let one = simd.lanes(1.0);
         let count = Lanes::<S>::COUNT;
         let mut samples = 0;
         for y in self.rows.clone() {
@@ -73,9 +73,9 @@ impl Sheet {
                 let mut places = [a; 3];
                 for axis in 0..3 {
                     let [of_a, of_b, of_s, start] = volume.rows[axis];
-                    let sum = Lanes::splat(simd, of_s).mul_add(s, Lanes::splat(simd, start));
-                    let sum = Lanes::splat(simd, of_b).mul_add(b, sum);
-                    places[axis] = Lanes::splat(simd, of_a).mul_add(a, sum);
+                    let sum = simd.lanes(of_s).mul_add(s, simd.lanes(start));
+                    let sum = simd.lanes(of_b).mul_add(b, sum);
+                    places[axis] = simd.lanes(of_a).mul_add(a, sum);
                 }
                 let cells = cells(simd, near, far, &places);
                 if !volume.lattice.shows(&cells) {
@@ -83,7 +83,7 @@ impl Sheet {
                 }
                 let corner = volume.lattice.corner(&cells);
                 for axis in 0..3 {
-                    places[axis] = places[axis] + Lanes::splat(simd, corner.from(axis, 0.0) as f32);
+                    places[axis] = places[axis] + simd.lanes(corner.from(axis, 0.0) as f32);
                 }
                 volume.lattice.values(simd, &corner, &places).store(&mut self.values[k..]);
                 one.store(&mut self.weights[k..]);
@@ -99,14 +99,14 @@ impl Sheet {
 /// The cells of the places of neighbouring pixels that are inside, and all between them.
 #[inline(always)]
 fn cells<S: Simd>(simd: S, near: Lanes<S>, far: Lanes<S>, places: &[Lanes<S>; 3]) -> Box3 {
-    let nowhere = Lanes::splat(simd, f32::INFINITY);
+    let nowhere = simd.lanes(f32::INFINITY);
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
     for a in 0..3 {
         let mut least = [f32::INFINITY; MAX_LANES];
         let mut greatest = [f32::NEG_INFINITY; MAX_LANES];
         places[a].where_less_or(near, far, nowhere).store(&mut least);
-        places[a].where_less_or(near, far, Lanes::splat(simd, f32::NEG_INFINITY)).store(&mut greatest);
+        places[a].where_less_or(near, far, simd.lanes(f32::NEG_INFINITY)).store(&mut greatest);
         low[a] = least.iter().fold(f32::INFINITY, |least, n| least.min(*n)).into();
         high[a] = greatest.iter().fold(f32::NEG_INFINITY, |greatest, n| greatest.max(*n)).into();
     }

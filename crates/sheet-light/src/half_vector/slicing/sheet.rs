@@ -16,7 +16,7 @@ use crate::shared::depths::{DepthRange, DepthSpans};
 use crate::shared::sections::LEAST_WEIGHT;
 use crate::shared::sections::{PHASES, SectionsAround};
 use crate::shared::sums::rounded;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
@@ -126,14 +126,13 @@ impl Sheet {
         columns: Range<usize>,
         faces: DepthRange,
     ) -> bool {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
-        let first = broadcast(faces.near);
-        let last = broadcast(faces.far);
-        let half = broadcast(0.5);
-        let zero = broadcast(0.0);
-        let one = broadcast(1.0);
-        let middle = broadcast(0.5 * (faces.near + faces.far));
-        let per_slab = broadcast(1.0 / (faces.far - faces.near));
+        let first = simd.lanes(faces.near);
+        let last = simd.lanes(faces.far);
+        let half = simd.lanes(0.5);
+        let zero = simd.lanes(0.0);
+        let one = simd.lanes(1.0);
+        let middle = simd.lanes(0.5 * (faces.near + faces.far));
+        let per_slab = simd.lanes(1.0 / (faces.far - faces.near));
         let mut any = false;
         let mut any_cut = false;
         let mut run = columns.start..columns.start;
@@ -227,19 +226,18 @@ impl Sheet {
     ) -> u64 {
         let SectionsAround { before, here, after } = sections;
         let Rectangle { rows, columns } = pixels;
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let [aa, ab, bb] = splatter.shape.conic;
-        let aa = broadcast(aa);
-        let ab = broadcast(2.0 * ab);
-        let bb = broadcast(bb);
-        let value = broadcast(record.value);
-        let section_here = broadcast(here);
-        let a = broadcast(record.center.x);
-        let b = broadcast(record.center.y);
-        let one = broadcast(1.0);
-        let zero = broadcast(0.0);
-        let to_before = broadcast(before - here);
-        let to_after = broadcast(after - here);
+        let aa = simd.lanes(aa);
+        let ab = simd.lanes(2.0 * ab);
+        let bb = simd.lanes(bb);
+        let value = simd.lanes(record.value);
+        let section_here = simd.lanes(here);
+        let a = simd.lanes(record.center.x);
+        let b = simd.lanes(record.center.y);
+        let one = simd.lanes(1.0);
+        let zero = simd.lanes(0.0);
+        let to_before = simd.lanes(before - here);
+        let to_after = simd.lanes(after - here);
         let mut fragments = 0;
         let of_neighbour = here == 0.0;
         for y in rows.clone() {
@@ -297,7 +295,7 @@ impl Sheet {
             let mut x = self.spans[y].start;
             while x < self.spans[y].end {
                 let k = y * stride + x;
-                let weight = Lanes::load(simd, &self.weights[k..]).max(Lanes::splat(simd, LEAST_WEIGHT));
+                let weight = Lanes::load(simd, &self.weights[k..]).max(simd.lanes(LEAST_WEIGHT));
                 (Lanes::load(simd, &self.values[k..]) / weight).store(&mut self.values[k..]);
                 x += Lanes::<S>::COUNT;
             }
@@ -309,7 +307,7 @@ impl Sheet {
     pub(crate) fn classify<S: Simd>(&self, simd: S, placed: &Placed<'_>, k: usize) -> [Lanes<S>; 4] {
         let [extinction, red, green, blue] = placed.classifier.classify(simd, Lanes::load(simd, &self.values[k..]));
         let weight = Lanes::load(simd, &self.weights[k..]);
-        [extinction.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight), red, green, blue]
+        [extinction.where_less(simd.lanes(LEAST_WEIGHT), weight), red, green, blue]
     }
 
     /// Depth of what each ray from pixel `k` on has of slab and volume between two depths, 0 for none.
@@ -317,7 +315,7 @@ impl Sheet {
     pub(crate) fn depth<S: Simd>(&self, simd: S, k: usize, spans: &DepthSpans) -> Lanes<S> {
         let near = Lanes::load(simd, &self.near[k..]).max(Lanes::load(simd, &spans.from));
         let far = Lanes::load(simd, &self.far[k..]).min(Lanes::load(simd, &spans.to));
-        (far - near).max(Lanes::splat(simd, 0.0))
+        (far - near).max(simd.lanes(0.0))
     }
 }
 

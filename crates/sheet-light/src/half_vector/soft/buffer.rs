@@ -18,7 +18,7 @@ use crate::shared::depths::DepthRange;
 use crate::shared::pixel::Pixel;
 use rayon::prelude::*;
 use splat_core::glam::{DVec2, DVec3, Vec3};
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::{self, Simd};
 use std::ops::Range;
 
@@ -362,7 +362,7 @@ impl pulp::WithSimd for Add<'_> {
         let stride = buffer.stride();
         let each = (part.shifts.len() + 1) * planes * stride;
         let still = Shift { scale: 0.0, start: [0.0; 2] };
-        let mut moved_to = [Lanes::splat(simd, 0.0); ROWS];
+        let mut moved_to = [simd.lanes(0.0); ROWS];
         for (point, shift) in std::iter::once(&still).chain(&part.shifts).enumerate() {
             let columns = columns_for(shift, &part.columns, width);
             let rows_here = rows_for(shift, &part.rows, height);
@@ -424,25 +424,24 @@ impl SoftBuffer {
         rows: Range<usize>,
         plane: usize,
     ) -> [[Lanes<S>; 2]; ROWS] {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         // Soft light so far, and length per depth of the centre's rays.
-        let mut out = [[broadcast(0.0), self.length(simd, Pixel { x, y: 0 })]; ROWS];
+        let mut out = [[simd.lanes(0.0), self.length(simd, Pixel { x, y: 0 })]; ROWS];
         for (y, out) in rows.clone().zip(&mut out) {
             out[1] = self.length(simd, Pixel { x, y });
         }
-        let mut optical_depths = [broadcast(0.0); ROWS];
+        let mut optical_depths = [simd.lanes(0.0); ROWS];
         let mut whole = 0.0;
         for (point, (shift, share)) in part.shifts.iter().zip(&self.penumbra.shares).enumerate() {
             whole += share;
             let row = |y: i64| self.sum_row(y, point + 1, plane);
             moved(simd, row, &shift.inverse(), x, rows.clone(), &mut optical_depths);
             for (optical, [soft, length]) in optical_depths[..rows.len()].iter().zip(&mut out) {
-                *soft = *soft + (*optical * *length).max(broadcast(0.0)).exp_neg() * broadcast(*share);
+                *soft = *soft + (*optical * *length).max(simd.lanes(0.0)).exp_neg() * simd.lanes(*share);
             }
         }
         for (y, [soft, length]) in rows.zip(&mut out) {
-            let mean = *soft / broadcast(whole);
-            *soft = (broadcast(0.0) - mean.max(broadcast(LEAST)).logarithm()).max(broadcast(0.0));
+            let mean = *soft / simd.lanes(whole);
+            *soft = (simd.lanes(0.0) - mean.max(simd.lanes(LEAST)).logarithm()).max(simd.lanes(0.0));
             *length = *length * Lanes::load(simd, &self.sum_row(y as i64, 0, plane)[PAD + x..]);
         }
         out

@@ -3,7 +3,7 @@
 use super::penumbra::Shift;
 use crate::half_vector::slicing::band::ROWS;
 use crate::shared::vectors::COUNTING;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
@@ -48,7 +48,7 @@ pub(crate) fn moved<'a, S: Simd>(
     let (taps, weights) = taps(simd, shift, x);
     let from = row_at(rows.start).floor() as i64 - 1;
     let held_rows = ((row_at(rows.end - 1).floor() as i64 + 3 - from) as usize).min(HELD);
-    let mut held = [Lanes::splat(simd, 0.0); HELD];
+    let mut held = [simd.lanes(0.0); HELD];
     for (r, held) in held[..held_rows].iter_mut().enumerate() {
         let row = row(from + r as i64);
         for (k, weight) in taps.clone().zip(&weights) {
@@ -60,9 +60,9 @@ pub(crate) fn moved<'a, S: Simd>(
         let low = row_at(y).floor();
         let share = (row_at(y) - row_at(y).floor()) as f32;
         let first = ((low as i64 - 1 - from) as usize).min(HELD - 4);
-        *to = Lanes::splat(simd, 0.0);
+        *to = simd.lanes(0.0);
         for n in 0..4 {
-            let weight = Lanes::splat(simd, cubic(share + 1.0 - n as f32));
+            let weight = simd.lanes(cubic(share + 1.0 - n as f32));
             *to = weight.mul_add(held[first + n], *to);
         }
     }
@@ -71,21 +71,21 @@ pub(crate) fn moved<'a, S: Simd>(
 /// Which pixels of a padded row those from `x` on lie between, and how each weighs.
 #[inline(always)]
 fn taps<S: Simd>(simd: S, shift: &Shift, x: usize) -> (Range<i64>, [Lanes<S>; TAPS]) {
-    let broadcast = |v: f32| Lanes::splat(simd, v);
     let scale = shift.scale as f32;
     let start = shift.start[0] as f32;
     let by = |x: usize| (x as f32).mul_add(scale, start);
     let ends = [by(x), by(x + Lanes::<S>::COUNT - 1)];
     let first = ends[0].min(ends[1]).floor() as i64 - 1;
     let last = ends[0].max(ends[1]).floor() as i64 + 2;
-    let by = (broadcast(x as f32) + Lanes::load(simd, &COUNTING)).mul_add(broadcast(scale), broadcast(start));
-    let mut weights = [broadcast(0.0); TAPS];
+    let by = (simd.lanes(x as f32) + Lanes::load(simd, &COUNTING)).mul_add(simd.lanes(scale), simd.lanes(start));
+    let mut weights = [simd.lanes(0.0); TAPS];
     let count = ((last - first + 1) as usize).min(TAPS);
     for (n, weight) in weights[..count].iter_mut().enumerate() {
-        let a = (by - broadcast((first + n as i64) as f32)).abs();
-        let inner = (broadcast(1.5).mul_add(a, broadcast(-2.5)) * a).mul_add(a, broadcast(1.0));
-        let outer = (broadcast(-0.5).mul_add(a, broadcast(2.5)).mul_add(a, broadcast(-4.0))).mul_add(a, broadcast(2.0));
-        *weight = inner.where_less_or(a, broadcast(1.0), outer.where_less(a, broadcast(2.0)));
+        let a = (by - simd.lanes((first + n as i64) as f32)).abs();
+        let inner = (simd.lanes(1.5).mul_add(a, simd.lanes(-2.5)) * a).mul_add(a, simd.lanes(1.0));
+        let outer =
+            (simd.lanes(-0.5).mul_add(a, simd.lanes(2.5)).mul_add(a, simd.lanes(-4.0))).mul_add(a, simd.lanes(2.0));
+        *weight = inner.where_less_or(a, simd.lanes(1.0), outer.where_less(a, simd.lanes(2.0)));
     }
     let start = x as i64 + PAD as i64 + first;
     (start..start + count as i64, weights)
@@ -119,7 +119,7 @@ mod tests {
             let Self(image, shift, x, y) = self;
             let mut out = vec![0.0; MAX_LANES];
             for n in (0..MAX_LANES).step_by(Lanes::<S>::COUNT) {
-                let mut to = [Lanes::splat(simd, 0.0); ROWS];
+                let mut to = [simd.lanes(0.0); ROWS];
                 let row = |y: i64| &image[y.clamp(0, image.len() as i64 - 1) as usize][..];
                 moved(simd, row, shift, x + n, y..y + 3, &mut to);
                 to[2].store(&mut out[n..]);

@@ -13,7 +13,7 @@ use crate::image_aligned::viewed::eye_of;
 use crate::shared::sections::LEAST_WEIGHT;
 use crate::shared::sections::PHASES;
 use crate::shared::slabs::{BATCH, Slabs};
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 
 /// Sheets whose depths are less apart than this share of a slab tell no slope.
@@ -73,16 +73,16 @@ impl NearEye {
     #[inline(always)]
     fn mend<S: Simd>(&self, simd: S, place: Place, middle: f32, sheets: &mut Sheets) {
         let Place { slab, y, x } = place;
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let [value, weight] = sheets.load(simd, slab, y, x);
         let [next, next_weight] = sheets.load(simd, slab + 1, y, x);
         let [depth, _] = self.depths.load(simd, slab, y, x);
         let [next_depth, _] = self.depths.load(simd, slab + 1, y, x);
         let apart = next_depth - depth;
-        let least = broadcast(LEAST_APART as f32);
-        let slope = (next - value) / broadcast(1.0).where_less_or(apart, least, apart);
+        let least = simd.lanes(LEAST_APART as f32);
+        let slope = (next - value) / simd.lanes(1.0).where_less_or(apart, least, apart);
         let slope = slope.where_less(least, apart);
-        let slope = slope.where_less(broadcast(LEAST_WEIGHT), weight).where_less(broadcast(LEAST_WEIGHT), next_weight);
-        sheets.set(slab, y, x, (broadcast(middle) - depth).mul_add(slope, value));
+        let slope =
+            slope.where_less(simd.lanes(LEAST_WEIGHT), weight).where_less(simd.lanes(LEAST_WEIGHT), next_weight);
+        sheets.set(slab, y, x, (simd.lanes(middle) - depth).mul_add(slope, value));
     }
 }

@@ -6,7 +6,7 @@
 use super::size::{SIDE, TILE};
 use crate::Params;
 use crate::shared::sums::{Sum, add};
-use splat_core::raster::lanes::{Lanes, MAX_LANES, exp_neg};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES, exp_neg};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 use splat_core::{Accumulator, DepthFragment, DepthProfile};
@@ -71,7 +71,7 @@ impl<S: Simd> Pixels<S> {
     /// Composites fragments, as [`Picture::composite`] does.
     #[inline(always)]
     pub(crate) fn composite(&mut self, simd: S, fragments: &Fragments) {
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let tau = zero.where_less_or(self.transmittance, self.cutoff, Lanes::load(simd, &fragments.optical_depth[0]));
         let weight = self.transmittance * tau.opacity();
         self.optical_depth.add(simd, tau);
@@ -175,12 +175,12 @@ impl Picture {
         for y in 0..TILE {
             let mut bits = 0;
             for x in (0..TILE).step_by(Lanes::<S>::COUNT) {
-                let mut most = Lanes::splat(simd, 0.0);
+                let mut most = simd.lanes(0.0);
                 for p in 0..self.planes {
                     most = most.max(Lanes::load(simd, &self.transmittance[p * PIXELS + y * TILE + x..]));
                 }
                 let mut of_lanes = (1 << Lanes::<S>::COUNT) - 1;
-                if most.any_less(Lanes::splat(simd, least)) {
+                if most.any_less(simd.lanes(least)) {
                     let mut through = [0.0; MAX_LANES];
                     most.store(&mut through);
                     let lanes = through[..Lanes::<S>::COUNT].iter().rev();
@@ -216,8 +216,8 @@ impl Picture {
             optical_depth,
             transmittance: Lanes::load(simd, &self.transmittance[first..]),
             values,
-            cutoff: Lanes::splat(simd, self.cutoff),
-            below_open: Lanes::splat(simd, self.least_open().next_down()),
+            cutoff: simd.lanes(self.cutoff),
+            below_open: simd.lanes(self.least_open().next_down()),
         }
     }
 
@@ -256,7 +256,7 @@ impl Picture {
     pub(crate) fn composite<S: Simd>(&mut self, simd: S, y: usize, x: usize, fragments: &Fragments, origin: f64) {
         let first = y * TILE + x;
         self.is_changed = true;
-        let zero = Lanes::splat(simd, 0.0);
+        let zero = simd.lanes(0.0);
         let mut most = zero;
         for p in 0..self.planes {
             most = most.max(Lanes::load(simd, &self.transmittance[p * PIXELS + first..]));
@@ -265,11 +265,7 @@ impl Picture {
         let mut before = zero;
         for p in 0..self.planes {
             let plane = p * PIXELS + first;
-            let tau = zero.where_less_or(
-                most,
-                Lanes::splat(simd, self.cutoff),
-                Lanes::load(simd, &fragments.optical_depth[p]),
-            );
+            let tau = zero.where_less_or(most, simd.lanes(self.cutoff), Lanes::load(simd, &fragments.optical_depth[p]));
             let through = Lanes::load(simd, &self.transmittance[plane..]);
             let opacity = tau.opacity();
             weights[p] = through * opacity;

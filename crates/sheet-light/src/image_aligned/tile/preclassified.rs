@@ -6,7 +6,7 @@ use super::ring::{Record, Ring, Splatter};
 use super::sheets::Sheets;
 use super::size::SIDE;
 use crate::shared::classifier::Classifier;
-use splat_core::raster::lanes::Lanes;
+use splat_core::raster::lanes::{Broadcast, Lanes};
 use splat_core::raster::pulp::Simd;
 
 /// Extinction, and red, green and blue times it.
@@ -68,7 +68,7 @@ impl Preclassified {
         let [red, _] = second.load(simd, slab, y, x);
         let [green, _] = third.load(simd, slab, y, x);
         let [blue, _] = fourth.load(simd, slab, y, x);
-        let inverse = Lanes::splat(simd, 1.0) / extinction.max(Lanes::splat(simd, f32::MIN_POSITIVE));
+        let inverse = simd.lanes(1.0) / extinction.max(simd.lanes(f32::MIN_POSITIVE));
         [extinction, red * inverse, green * inverse, blue * inverse]
     }
 }

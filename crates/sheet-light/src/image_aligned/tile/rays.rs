@@ -9,7 +9,7 @@ use crate::shared::pixel::Pixel;
 use crate::shared::slabs::Slabs;
 use splat_core::Camera;
 use splat_core::glam::DVec3;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use std::ops::Range;
 
@@ -63,16 +63,16 @@ impl Slopes {
     #[inline(always)]
     pub(crate) fn places<S: Simd>(&self, simd: S, first: Pixel, depth: Lanes<S>) -> [Lanes<S>; 3] {
         let Pixel { x, y } = first;
-        let start = [Lanes::load(simd, &self.start[0][x..]), Lanes::splat(simd, self.start[1][y])];
+        let start = [Lanes::load(simd, &self.start[0][x..]), simd.lanes(self.start[1][y])];
         if self.slant.is_any() {
             let [sx, sy] = self.slant.single();
-            let [sx, sy] = [Lanes::splat(simd, sx), Lanes::splat(simd, sy)];
+            let [sx, sy] = [simd.lanes(sx), simd.lanes(sy)];
             return [start[0], start[1], depth - (sx * start[0] + sy * start[1])];
         }
         if self.is_parallel {
             return [start[0], start[1], depth];
         }
-        let [u, v] = [Lanes::load(simd, &self.u[x..]), Lanes::splat(simd, self.v[y])];
+        let [u, v] = [Lanes::load(simd, &self.u[x..]), simd.lanes(self.v[y])];
         [u.mul_add(depth, start[0]), v.mul_add(depth, start[1]), depth]
     }
 

@@ -14,7 +14,7 @@ use crate::shared::slabs::BATCH;
 use crate::shared::sums::rounded;
 use crate::shared::vectors::COUNTING;
 use splat_core::raster::kernel::Kernel;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::raster::tile::Line;
 use std::ops::Range;
@@ -184,31 +184,30 @@ impl Ring {
         footprint: &PixelFootprint,
         rectangle: &Rectangle,
     ) {
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let [a, _, c] = footprint.conic;
-        let q = broadcast(splatter.taper.sharpness);
+        let q = simd.lanes(splatter.taper.sharpness);
         let rim = splatter.taper.polynomial;
         let Rectangle { columns, rows } = rectangle;
         let mut y = rows.start;
         while y < rows.end {
-            let dy = broadcast(y as f32 + 0.5 - record.center[1]) + Lanes::load(simd, &COUNTING);
-            let s = broadcast(c) * dy * dy;
+            let dy = simd.lanes(y as f32 + 0.5 - record.center[1]) + Lanes::load(simd, &COUNTING);
+            let s = simd.lanes(c) * dy * dy;
             s.store(&mut self.rows[0][y - rows.start..]);
             (q * s).exp_neg().store(&mut self.rows[1][y - rows.start..]);
             y += Lanes::<S>::COUNT;
         }
         let mut x = columns.start;
         while x < columns.end {
-            let dx = broadcast(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
-            let across = broadcast(a) * dx * dx;
+            let dx = simd.lanes(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
+            let across = simd.lanes(a) * dx * dx;
             let gauss = (q * across).exp_neg();
             for row in 0..rows.len() {
-                let s = across + broadcast(self.rows[0][row]);
-                let taper = broadcast(rim[2]).mul_add(s, broadcast(rim[1])).mul_add(s, broadcast(rim[0]));
+                let s = across + simd.lanes(self.rows[0][row]);
+                let taper = simd.lanes(rim[2]).mul_add(s, simd.lanes(rim[1])).mul_add(s, simd.lanes(rim[0]));
                 let weight = gauss
-                    .mul_add(broadcast(self.rows[1][row]), taper)
-                    .max(broadcast(0.0))
-                    .where_less(s, broadcast(1.0));
+                    .mul_add(simd.lanes(self.rows[1][row]), taper)
+                    .max(simd.lanes(0.0))
+                    .where_less(s, simd.lanes(1.0));
                 weight.store(&mut self.weights[row * STRIDE + x - columns.start..]);
             }
             x += Lanes::<S>::COUNT;
@@ -226,15 +225,14 @@ impl Ring {
         rectangle: &Rectangle,
     ) {
         let [a, b, c] = footprint.conic;
-        let broadcast = |v: f32| Lanes::splat(simd, v);
         let Rectangle { columns, rows } = rectangle;
         for y in rows.clone() {
             let dy = y as f32 + 0.5 - record.center[1];
             let mut x = columns.start;
             while x < columns.end {
-                let dx = broadcast(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
-                let s = broadcast(a).mul_add(dx, broadcast(2.0 * b * dy)).mul_add(dx, broadcast(c * dy * dy));
-                let weight = splatter.kernel.profile(simd, (broadcast(1.0) - s).max(broadcast(0.0)));
+                let dx = simd.lanes(x as f32 + 0.5 - record.center[0]) + Lanes::load(simd, &COUNTING);
+                let s = simd.lanes(a).mul_add(dx, simd.lanes(2.0 * b * dy)).mul_add(dx, simd.lanes(c * dy * dy));
+                let weight = splatter.kernel.profile(simd, (simd.lanes(1.0) - s).max(simd.lanes(0.0)));
                 weight.store(&mut self.weights[(y - rows.start) * STRIDE + x - columns.start..]);
                 x += Lanes::<S>::COUNT;
             }
@@ -332,7 +330,7 @@ impl Covered<'_> {
     /// Adds weight times `sums` to the lines of the rows of which any pixel is wanted. Rows.
     #[inline(always)]
     fn add<S: Simd>(self, simd: S, sums: &[f32; 16], width: usize) -> u64 {
-        let mut parts = [Lanes::splat(simd, 0.0); 16];
+        let mut parts = [simd.lanes(0.0); 16];
         for p in 0..16 / Lanes::<S>::COUNT {
             parts[p] = Lanes::load(simd, &sums[p * Lanes::<S>::COUNT..]);
         }
@@ -400,7 +398,7 @@ fn round<S: Simd>(simd: S, lines: &mut [Line], width: usize) {
 
 #[inline(always)]
 fn add_line<S: Simd>(simd: S, line: &mut Line, weight: f32, parts: &[Lanes<S>; 16]) {
-    let weight = Lanes::splat(simd, weight);
+    let weight = simd.lanes(weight);
     for p in 0..16 / Lanes::<S>::COUNT {
         let to = &mut line.0[p * Lanes::<S>::COUNT..];
         weight.mul_add(parts[p], Lanes::load(simd, to)).store(to);

@@ -19,7 +19,7 @@ use crate::shared::volume::Volume;
 use splat_core::Shading;
 use splat_core::glam::Vec3;
 use splat_core::optics::TRACE;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::shade::{ChannelLayout, MAX_CHANNELS};
 
@@ -88,7 +88,7 @@ impl Shader<'_> {
         fragments: &mut Fragments,
     ) {
         let medium = self.classify(simd, reconstructed, place, reconstructed.faces);
-        if !Lanes::splat(simd, 0.0).any_less(medium.depth) {
+        if !simd.lanes(0.0).any_less(medium.depth) {
             return;
         }
         let volume = &reconstructed.prepared.volume;
@@ -97,7 +97,7 @@ impl Shader<'_> {
             fragments.any = true;
             self.values(simd, reconstructed, place, &medium, kept, &mut fragments.values);
             for p in 0..picture.planes {
-                (medium.depth * Lanes::splat(simd, extinction[p])).store(&mut fragments.optical_depth[p]);
+                (medium.depth * simd.lanes(extinction[p])).store(&mut fragments.optical_depth[p]);
             }
             medium.near.store(&mut fragments.near);
             medium.far.store(&mut fragments.far);
@@ -109,7 +109,7 @@ impl Shader<'_> {
         medium.depth.store(&mut shaded.tau);
         for p in 0..picture.planes {
             let before = Lanes::load(simd, &fragments.optical_depth[p]);
-            (medium.depth * Lanes::splat(simd, extinction[p]) + before).store(&mut fragments.optical_depth[p]);
+            (medium.depth * simd.lanes(extinction[p]) + before).store(&mut fragments.optical_depth[p]);
         }
         mix(simd, &shaded, &medium, fragments, picture);
     }
@@ -128,7 +128,7 @@ impl Shader<'_> {
         let material = reconstructed.prepared.volume.material;
         if material.shading == Shading::Unlit && self.layout.count() == 3 {
             for c in 0..3 {
-                (medium.color[c] + Lanes::splat(simd, material.emission[c])).store(&mut values[c]);
+                (medium.color[c] + simd.lanes(material.emission[c])).store(&mut values[c]);
             }
         } else if !reconstructed.is_part {
             self.light(simd, reconstructed, place, medium, values);
@@ -152,11 +152,11 @@ impl Shader<'_> {
         faces: DepthRange,
     ) -> Medium<S> {
         let [near, far] = if reconstructed.is_whole {
-            [Lanes::splat(simd, faces.near), Lanes::splat(simd, faces.far)]
+            [simd.lanes(faces.near), simd.lanes(faces.far)]
         } else {
             self.ends(simd, reconstructed, place, faces)
         };
-        let length = (far - near).max(Lanes::splat(simd, 0.0));
+        let length = (far - near).max(simd.lanes(0.0));
         let [value, weight] = if reconstructed.is_whole {
             reconstructed.sheets.load(simd, place.slab, place.y, place.x)
         } else {
@@ -167,7 +167,7 @@ impl Shader<'_> {
             Some(classes) => classes.load(simd, place.slab, place.y, place.x),
         };
         let secant = self.secants(simd, place);
-        let depth = (extinction * length * secant).where_less(Lanes::splat(simd, LEAST_WEIGHT), weight);
+        let depth = (extinction * length * secant).where_less(simd.lanes(LEAST_WEIGHT), weight);
         Medium { near, far, depth, secant, color: [red, green, blue] }
     }
 
@@ -185,10 +185,10 @@ impl Shader<'_> {
         let inner = (place.y - 1) * TILE + place.x - 1;
         let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..])
             .max(Lanes::load(simd, &reconstructed.limits[0][inner..]))
-            .max(Lanes::splat(simd, faces.near));
+            .max(simd.lanes(faces.near));
         let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..])
             .min(Lanes::load(simd, &reconstructed.limits[1][inner..]))
-            .min(Lanes::splat(simd, faces.far));
+            .min(simd.lanes(faces.far));
         match reconstructed.part {
             None => [near, far],
             Some(part) => [near.max(Lanes::load(simd, &part.from)), far.min(Lanes::load(simd, &part.to))],
@@ -203,11 +203,10 @@ impl Shader<'_> {
         let Place { slab, y, x } = place;
         let [value, weight] = reconstructed.sheets.load(simd, slab, y, x);
         let slabs = &reconstructed.prepared.slabs;
-        let splat = |v: f32| Lanes::splat(simd, v);
-        let zero = splat(0.0);
+        let zero = simd.lanes(0.0);
         let faces = slabs.faces(slab);
-        let first = splat(faces.near);
-        let last = splat(faces.far);
+        let first = simd.lanes(faces.near);
+        let last = simd.lanes(faces.far);
         let near = Lanes::load(simd, &reconstructed.crossings.near[place.pixel()..]).max(first);
         let far = Lanes::load(simd, &reconstructed.crossings.far[place.pixel()..]).min(last);
         // Twice as far as the middle lies behind that of the slab.
@@ -215,8 +214,8 @@ impl Shader<'_> {
         if !zero.any_less(behind.abs()) {
             return [value, weight];
         }
-        let half = splat(0.5 / slabs.width as f32);
-        let least = splat(LEAST_WEIGHT);
+        let half = simd.lanes(0.5 / slabs.width as f32);
+        let least = simd.lanes(LEAST_WEIGHT);
         let [value_after, weight_after] = reconstructed.sheets.load(simd, slab + 1, y, x);
         let [value_before, weight_before] = reconstructed.sheets.load(simd, slab.max(1) - 1, y, x);
         let after = behind.max(zero) * half * (value_after - value).where_less(least, weight_after);
@@ -228,16 +227,16 @@ impl Shader<'_> {
     #[inline(always)]
     fn secants<S: Simd>(&self, simd: S, place: Place) -> Lanes<S> {
         if self.input.camera.is_orthographic() {
-            return Lanes::splat(simd, 1.0);
+            return simd.lanes(1.0);
         }
         let [u, v] = self.slopes(simd, place);
-        u.mul_add(u, v.mul_add(v, Lanes::splat(simd, 1.0))).sqrt()
+        u.mul_add(u, v.mul_add(v, simd.lanes(1.0))).sqrt()
     }
 
     /// x and y per unit of view depth of rays in perspective.
     #[inline(always)]
     fn slopes<S: Simd>(&self, simd: S, place: Place) -> [Lanes<S>; 2] {
-        [Lanes::load(simd, &self.slopes.u[place.x..]), Lanes::splat(simd, self.slopes.v[place.y])]
+        [Lanes::load(simd, &self.slopes.u[place.x..]), simd.lanes(self.slopes.v[place.y])]
     }
 
     /// Where light is asked for: the middle of the medium.
@@ -250,11 +249,10 @@ impl Shader<'_> {
         medium: &Medium<S>,
         lane_bits: u32,
     ) -> Spots<S> {
-        let of_all = |v: f32| Lanes::splat(simd, v);
-        let zero = of_all(0.0);
-        let half = of_all(0.5);
+        let zero = simd.lanes(0.0);
+        let half = simd.lanes(0.5);
         let middle = (medium.near + medium.far) * half;
-        let towards = of_all(-1.0) / medium.secant;
+        let towards = simd.lanes(-1.0) / medium.secant;
         let to_eye = if self.input.camera.is_orthographic() {
             [zero, zero, towards]
         } else {
@@ -285,7 +283,7 @@ impl Shader<'_> {
             Place { slab, y: y - 1, x },
             Place { slab, y: y + 1, x },
         ];
-        let mut samples = [[value, Lanes::splat(simd, 0.0)]; 6];
+        let mut samples = [[value, simd.lanes(0.0)]; 6];
         // Before the first slab there is no sample.
         for k in usize::from(slab == 0)..6 {
             samples[k] = self.sample(simd, reconstructed, neighbours[k]);
@@ -297,20 +295,20 @@ impl Shader<'_> {
         let z = slabs.origin + (f64::from(slab) + 0.5) * slabs.width;
         let pixels = self.input.camera.focal_px() * slabs.width;
         if self.input.camera.is_orthographic() {
-            let pixels = Lanes::splat(simd, pixels as f32);
+            let pixels = simd.lanes(pixels as f32);
             let right = right * pixels;
-            let up = Lanes::splat(simd, 0.0) - down * pixels;
+            let up = simd.lanes(0.0) - down * pixels;
             if !self.slopes.slant.is_any() {
                 return [right, up, along];
             }
             // Along a slab depth changes, too.
             let [sx, sy] = self.slopes.slant.single();
-            let [sx, sy] = [Lanes::splat(simd, sx), Lanes::splat(simd, sy)];
+            let [sx, sy] = [simd.lanes(sx), simd.lanes(sy)];
             return [right + sx * along, up + sy * along, along];
         }
-        let pixels = Lanes::splat(simd, (pixels / z.max(slabs.width * 1e-3)) as f32);
+        let pixels = simd.lanes((pixels / z.max(slabs.width * 1e-3)) as f32);
         let gx = right * pixels;
-        let gy = Lanes::splat(simd, 0.0) - down * pixels;
+        let gy = simd.lanes(0.0) - down * pixels;
         let [u, v] = self.slopes(simd, place);
         [gx, gy, along - (u * gx + v * gy)]
     }
@@ -319,14 +317,14 @@ impl Shader<'_> {
     #[inline(always)]
     fn sample<S: Simd>(&self, simd: S, reconstructed: &Reconstructed<'_>, place: Place) -> [Lanes<S>; 2] {
         let pixel = place.pixel();
-        let zero = Lanes::splat(simd, 0.0);
-        let one = Lanes::splat(simd, 1.0);
-        let face = |slab: u32| Lanes::splat(simd, reconstructed.prepared.slabs.face(slab));
-        let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..]).max(face(place.slab));
-        let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..]).min(face(place.slab + 1));
+        let zero = simd.lanes(0.0);
+        let one = simd.lanes(1.0);
+        let slabs = &reconstructed.prepared.slabs;
+        let near = Lanes::load(simd, &reconstructed.crossings.near[pixel..]).max(simd.lanes(slabs.face(place.slab)));
+        let far = Lanes::load(simd, &reconstructed.crossings.far[pixel..]).min(simd.lanes(slabs.face(place.slab + 1)));
         let [value, weight] = reconstructed.sheets.load(simd, place.slab, place.y, place.x);
         let inside = one.where_less_or(near, far, zero);
-        [value, inside.where_less(Lanes::splat(simd, LEAST_WEIGHT), weight)]
+        [value, inside.where_less(simd.lanes(LEAST_WEIGHT), weight)]
     }
 
     /// All channels of a medium where it is seen, 0 elsewhere.
@@ -356,9 +354,9 @@ impl Shader<'_> {
         );
         for c in 0..self.layout.count() {
             // What is not seen may be no number.
-            let zero = Lanes::splat(simd, 0.0);
+            let zero = simd.lanes(0.0);
             let value = Lanes::load(simd, &values[c]);
-            let least = Lanes::splat(simd, if c < self.layout.colors() { TRACE } else { -1.0 });
+            let least = simd.lanes(if c < self.layout.colors() { TRACE } else { -1.0 });
             value.where_less(zero, medium.depth).where_less(least, value.abs()).store(&mut values[c]);
         }
     }
@@ -384,7 +382,7 @@ impl Shader<'_> {
         };
         let mut lit = Lit::dark(simd);
         if volume.material.shading != Shading::Unlit {
-            let mut through = [Lanes::splat(simd, 1.0); 3];
+            let mut through = [simd.lanes(1.0); 3];
             if let Some(shadows) = &reconstructed.prepared.shadows {
                 let cells = shadows.neighbours.cells(simd, &reconstructed.prepared.voxels, &spots.places, lane_bits);
                 let within = reconstructed.prepared.within.as_ref();
@@ -416,8 +414,9 @@ impl Shader<'_> {
         }
         if let Some(first) = self.layout.normal() {
             for a in 0..3 {
-                let along = |axis: usize| Lanes::splat(simd, self.axes[axis][a]);
-                dot(&spots.normal, &[along(0), along(1), along(2)]).store(&mut values[first + a]);
+                let [right, up, forward] = &self.axes;
+                let along = [simd.lanes(right[a]), simd.lanes(up[a]), simd.lanes(forward[a])];
+                dot(&spots.normal, &along).store(&mut values[first + a]);
             }
         }
         if let Some(at) = self.layout.shadow() {
@@ -429,11 +428,10 @@ impl Shader<'_> {
 /// −∇v/|∇v|, and 1 where there is a gradient, else 0.
 #[inline(always)]
 fn unit<S: Simd>(simd: S, gradient: &[Lanes<S>; 3]) -> ([Lanes<S>; 3], Lanes<S>) {
-    let broadcast = |v: f32| Lanes::splat(simd, v);
-    let inverse = broadcast(-1.0) / dot(gradient, gradient).sqrt();
-    let is_normal = broadcast(1.0).where_less(inverse, broadcast(0.0)).where_less(broadcast(-f32::MAX), inverse);
+    let inverse = simd.lanes(-1.0) / dot(gradient, gradient).sqrt();
+    let is_normal = simd.lanes(1.0).where_less(inverse, simd.lanes(0.0)).where_less(simd.lanes(-f32::MAX), inverse);
     let [x, y, z] = [gradient[0] * inverse, gradient[1] * inverse, gradient[2] * inverse];
-    let half = broadcast(0.5);
+    let half = simd.lanes(0.5);
     ([x.where_less(half, is_normal), y.where_less(half, is_normal), z.where_less(half, is_normal)], is_normal)
 }
 
@@ -443,12 +441,11 @@ fn mix<S: Simd>(simd: S, shaded: &Shaded<'_>, medium: &Medium<S>, fragments: &mu
     let Shaded { volume, tau, values } = shaded;
     let extinction = volume.material.extinction_rgb;
     let object = volume.object;
-    let broadcast = |v: f32| Lanes::splat(simd, v);
     let tau_here = Lanes::load(simd, tau);
     for c in 0..picture.channels {
         let p = ChannelLayout::plane_of(c, picture.channels, picture.planes);
-        let whole = Lanes::load(simd, &fragments.optical_depth[p]).max(broadcast(f32::MIN_POSITIVE));
-        let share = tau_here * broadcast(extinction[p]) / whole;
+        let whole = Lanes::load(simd, &fragments.optical_depth[p]).max(simd.lanes(f32::MIN_POSITIVE));
+        let share = tau_here * simd.lanes(extinction[p]) / whole;
         let before = Lanes::load(simd, &fragments.values[c]);
         let shaded = Lanes::load(simd, &values[c]);
         (shaded - before).mul_add(share, before).store(&mut fragments.values[c]);
@@ -465,12 +462,12 @@ fn mix<S: Simd>(simd: S, shaded: &Shaded<'_>, medium: &Medium<S>, fragments: &mu
             fragments.object[lane] = object;
         }
     }
-    let half = broadcast(0.5);
+    let half = simd.lanes(0.5);
     let first = Lanes::load(simd, &first);
-    let is = medium.near.where_less_or(broadcast(0.0), tau_here, near);
+    let is = medium.near.where_less_or(simd.lanes(0.0), tau_here, near);
     let both = near.min(is);
     is.where_less_or(first, half, both).store(&mut fragments.near);
-    let is = medium.far.where_less_or(broadcast(0.0), tau_here, far);
+    let is = medium.far.where_less_or(simd.lanes(0.0), tau_here, far);
     let both = far.max(is);
     is.where_less_or(first, half, both).store(&mut fragments.far);
 }

@@ -9,7 +9,7 @@
 use super::size::{AREA, SIDE};
 use crate::shared::sections::LEAST_WEIGHT;
 use crate::shared::slabs::BATCH;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// Sheets kept: those of two batches, so that both neighbours of a sheet are there.
@@ -87,7 +87,7 @@ impl Sheets {
             while x < range.end {
                 let index = Self::index(slab, y, x);
                 let n = Lanes::<S>::COUNT.min(range.end - x);
-                let weight = Lanes::load(simd, &self.weights[index..]).max(Lanes::splat(simd, LEAST_WEIGHT));
+                let weight = Lanes::load(simd, &self.weights[index..]).max(simd.lanes(LEAST_WEIGHT));
                 let value = Lanes::load(simd, &self.values[index..]) / weight;
                 let mut out = [0.0; MAX_LANES];
                 value.store(&mut out);
@@ -138,7 +138,7 @@ impl Sheets {
 /// Each neighbour is its value and 1, or anything and 0.
 #[inline(always)]
 pub(crate) fn difference<S: Simd>(simd: S, value: Lanes<S>, before: [Lanes<S>; 2], after: [Lanes<S>; 2]) -> Lanes<S> {
-    let half = Lanes::splat(simd, 0.5);
+    let half = simd.lanes(0.5);
     let steps = (before[1] + after[1]).max(half);
     let value_before = before[0].where_less_or(half, before[1], value);
     let value_after = after[0].where_less_or(half, after[1], value);

@@ -4,7 +4,7 @@ use crate::Volume;
 use crate::shared::vectors::NATURAL;
 use crate::shared::voxels::{VoxelPair, Voxels};
 use splat_core::Packing;
-use splat_core::raster::lanes::{Lanes, MAX_LANES};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 
 /// The needed voxels of a volume, and where they are.
@@ -59,22 +59,21 @@ impl Neighbours {
         if let Some(is_first_shifted) = self.is_first_shifted {
             return self.cells_between_shifted_planes(simd, voxels, places, lane_bits, is_first_shifted);
         }
-        let broadcast = |v: f32| Lanes::splat(simd, v);
-        let zero = broadcast(0.0);
-        let one = broadcast(1.0);
+        let zero = simd.lanes(0.0);
+        let one = simd.lanes(1.0);
         let mut first = [[0.0; MAX_LANES]; 3];
         let mut parts = [[[0.0; MAX_LANES]; 2]; 4];
         let mut high = [zero; 3];
         for a in 0..3 {
             let [x, y, z, start] = self.lattice_from_place[a];
             let place = places[0].mul_add(
-                broadcast(x),
-                places[1].mul_add(broadcast(y), places[2].mul_add(broadcast(z), broadcast(start))),
+                simd.lanes(x),
+                places[1].mul_add(simd.lanes(y), places[2].mul_add(simd.lanes(z), simd.lanes(start))),
             );
             // Half a step less, rounded: the voxel before, and for a place at a voxel that or the one before it.
-            let last = broadcast(NATURAL + (voxels.dims()[a] - 2) as f32);
-            let natural = ((place - broadcast(0.5)) + broadcast(NATURAL)).max(broadcast(NATURAL)).min(last);
-            high[a] = (place - (natural - broadcast(NATURAL))).max(zero).min(one);
+            let last = simd.lanes(NATURAL + (voxels.dims()[a] - 2) as f32);
+            let natural = ((place - simd.lanes(0.5)) + simd.lanes(NATURAL)).max(simd.lanes(NATURAL)).min(last);
+            high[a] = (place - (natural - simd.lanes(NATURAL))).max(zero).min(one);
             natural.store(&mut first[a]);
         }
         let low = [one - high[0], one - high[1], one - high[2]];
@@ -120,11 +119,10 @@ impl Neighbours {
         let mut stored = [[0.0; MAX_LANES]; 3];
         let dims = voxels.dims();
         for (along, [x, y, z, start]) in stored.iter_mut().zip(self.lattice_from_place) {
-            let broadcast = |v: f32| Lanes::splat(simd, v);
             places[0]
                 .mul_add(
-                    broadcast(x),
-                    places[1].mul_add(broadcast(y), places[2].mul_add(broadcast(z), broadcast(start))),
+                    simd.lanes(x),
+                    places[1].mul_add(simd.lanes(y), places[2].mul_add(simd.lanes(z), simd.lanes(start))),
                 )
                 .store(along);
         }
