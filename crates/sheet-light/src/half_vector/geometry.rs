@@ -16,7 +16,6 @@ use crate::shared::pixel::Pixel;
 use crate::shared::shadows::Shadows;
 use crate::shared::voxels::Voxels;
 use crate::{Error, Params, Volume};
-use splat_core::Progress;
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::LitBy;
 
@@ -25,7 +24,7 @@ pub(crate) struct VolumeVoxels<'a> {
     pub(crate) voxels: Voxels,
     pub(crate) values: Values<'a>,
     /// Shadows of what light is not carried through, where a light has any.
-    pub(crate) shadows: Option<Shadows>,
+    pub(crate) shadows: Option<Shadows<'a>>,
     /// Central-difference gradients, where normals come from a gradient volume.
     pub(crate) gradients: Option<GradientVolume>,
 }
@@ -81,16 +80,15 @@ impl<'a> Geometry<'a> {
     /// `shadow_origin` is the world position that receivers of shadows are relative to.
     pub(crate) fn sort_voxels(
         &mut self,
-        lights: &[LitBy<'_>],
+        lights: &[LitBy<'a>],
         mut buffer: Option<&mut LightBuffer>,
         shadow_origin: DVec3,
-        progress: &Progress,
-    ) -> Result<(), Error> {
+    ) {
         for (v, placed) in self.placed.iter().enumerate() {
             if let Reconstruction::Gather(kernel) = self.params.reconstruction {
                 let (volume, lattice, voxels) = GatheredVolume::new(placed, kernel, &self.frame, &self.sight);
                 let receivers = placed.receivers(&voxels, lattice.rim);
-                let shadows = Shadows::new(&receivers, lights, shadow_origin, progress)?;
+                let shadows = Shadows::new(&receivers, lights, shadow_origin);
                 let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
                 self.voxels.push(VolumeVoxels { voxels, values: Values::Gathered(volume), shadows, gradients });
                 continue;
@@ -103,7 +101,7 @@ impl<'a> Geometry<'a> {
             }
             let (lattice, voxels) = placed.voxels(reach);
             let receivers = placed.receivers(&voxels, lattice.rim);
-            let shadows = Shadows::new(&receivers, lights, shadow_origin, progress)?;
+            let shadows = Shadows::new(&receivers, lights, shadow_origin);
             let records = records(placed, &lattice, &voxels);
             let buckets = Buckets::new(&records, placed, &self.frame, &self.sight, shape);
             if let Some(buffer) = &mut buffer {
@@ -113,7 +111,6 @@ impl<'a> Geometry<'a> {
             let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
             self.voxels.push(VolumeVoxels { voxels, values: Values::Splatted(buckets), shadows, gradients });
         }
-        Ok(())
     }
 
     /// Depths across the slabs between which some places lie, world.

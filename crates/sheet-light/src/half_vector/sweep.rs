@@ -80,8 +80,8 @@ impl<'a> Sweep<'a> {
         let axis = request.axis.unwrap_or_else(view_axis);
         let mut geometry = Geometry::new(input, &params.sheets, &axis)?;
         let mut lighting = Lighting::new(input, params, &geometry, carried, mapped, request.light_alone);
-        let lights: Vec<LitBy<'_>> = lighting.light.iter().chain(mapped).copied().collect();
-        geometry.sort_voxels(&lights, lighting.buffer.as_mut(), sheets.shadow_origin, progress)?;
+        let lights: Vec<LitBy<'a>> = lighting.light.iter().chain(mapped).copied().collect();
+        geometry.sort_voxels(&lights, lighting.buffer.as_mut(), sheets.shadow_origin);
         let lit = lighting.light.as_ref().zip(carried);
         let lit = lit.map(|(lit, carried)| CarriedLight { lit, samples: carried.samples });
         lighting.depths = eye.light_depths(input, params, lit, progress)?;

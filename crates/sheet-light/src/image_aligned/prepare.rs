@@ -56,9 +56,9 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
         needed += GradientVolume::bytes(count, volume, params);
         check(needed, params)?;
         prepared.gradients = GradientVolume::new(&prepared.receivers(), &prepared.lattice, params);
-        prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
+        prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin);
         if params.lighting == Lighting::Joint {
-            prepared.within = Within::new(&prepared.receivers(), &input.lights, input.shadow_origin, progress)?;
+            prepared.within = Within::new(volume, &prepared.receivers(), &input.lights, input.shadow_origin);
         }
         volumes.push(prepared);
         progress.tick(1).map_err(cancelled)?;

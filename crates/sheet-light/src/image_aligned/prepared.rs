@@ -45,11 +45,11 @@ pub(crate) struct Prepared<'a> {
     pub(crate) classifier: Classifier,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
-    pub(crate) shadows: Option<Shadows>,
+    pub(crate) shadows: Option<Shadows<'a>>,
     /// What its sheets read, where they read the lattice instead of being written by its voxels.
     pub(crate) gathered: Option<Gathered<'a>>,
     /// Of one whose spacing is optically thick.
-    pub(crate) within: Option<Within>,
+    pub(crate) within: Option<Within<'a>>,
     /// Where normals come from that.
     pub(crate) gradients: Option<GradientVolume>,
     /// Its slabs that lack kernels, because these lie behind the eye.

@@ -9,29 +9,41 @@
 //! and of light that comes from behind, a < 0, e^(−A₁ − max(|a|, e) + …): see [`share`]. A face of the volume is sharp in a sheet, so nothing
 //! is blurred: a slab of any slabs has its closed form.
 
-use crate::Error;
-use crate::shared::error::cancelled;
-use crate::shared::lattice::neighbours::{Cells, Receivers, lanes};
-use rayon::prelude::*;
+use crate::Volume;
+use crate::shared::lattice::neighbours::{Cells, Neighbours, Receivers, VoxelReceivers, lanes};
+use crate::shared::voxels::{VoxelPlace, Voxels};
 use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::lanes::MAX_LANES;
 use splat_core::shade::LitBy;
 use splat_core::shade::joint::{MediumCell, THIN, mean, thickness};
-use splat_core::{Progress, Receiver, SplatKind, Transmittance};
+use splat_core::{Receiver, Transmittance};
+use std::sync::OnceLock;
 
 /// What a voxel knows of a light, by channel: the absorbance and its slopes, per step along each axis of the lattice.
 type Slopes = [[f32; 4]; 3];
 
+/// Voxels, neighbours among those that are needed, whose slopes are kept together: where none of them is asked for they take nothing.
+const TOGETHER: usize = 64;
+
+/// Slopes of some voxels, once they were asked for; `None` of a voxel beyond the faces of the volume, where nothing goes on as inside.
+type Part = [OnceLock<Option<Slopes>>; TOGETHER];
+
 /// A thick volume in its lights.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Within {
-    /// By light, a number of voxels and two more; `None` for one without shadows.
-    of_lights: Vec<Option<Vec<Slopes>>>,
-    /// Whether a voxel lies in the volume, two more at the end: beyond its faces nothing goes on as inside.
-    is_inside: Vec<bool>,
+pub(crate) struct Within<'a> {
+    volume: Volume<'a>,
+    /// `None` for a light without shadows.
+    lights: Vec<Option<LightWithin<'a>>>,
+    voxels: VoxelReceivers,
+    axes: DMat3,
     /// Mean step of the lattice, world units.
-    width: f32,
-    extinction_rgb: [f32; 3],
+    width: f64,
+}
+
+/// A light, and the slopes of the needed voxels, by rank.
+struct LightWithin<'a> {
+    lit: LitBy<'a>,
+    shadow: &'a dyn Transmittance,
+    parts: Vec<OnceLock<Box<Part>>>,
 }
 
 /// The part of a ray in a slab.
@@ -46,48 +58,54 @@ pub(crate) struct RayPart {
     pub(crate) optical_depth: f32,
 }
 
-impl Within {
-    /// Looks depths up about each needed voxel; `None` where no step through the volume is thick, or no light has shadows.
+impl<'a> Within<'a> {
+    /// Before any voxel was asked for; `None` where no step through the volume is thick, or no light has shadows.
     pub(crate) fn new(
+        volume: &Volume<'a>,
         receivers: &Receivers<'_>,
-        lights: &[LitBy<'_>],
+        lights: &[LitBy<'a>],
         origin: DVec3,
-        progress: &Progress,
-    ) -> Result<Option<Self>, Error> {
+    ) -> Option<Self> {
         let has_shadows = lights.iter().any(|lit| lit.shadow.is_some());
-        if !has_shadows || receivers.volume.shadow_coefficient == 0.0 || !is_thick(receivers) {
-            return Ok(None);
+        if !has_shadows || volume.shadow_coefficient == 0.0 || !is_thick(receivers) {
+            return None;
         }
-        let voxels = VoxelDepths::new(receivers, origin);
-        let slopes =
-            |lit: &LitBy<'_>| lit.shadow.map(|shadow| voxels.slopes_of_light(lit, shadow, progress)).transpose();
-        let of_lights = lights.iter().map(slopes).collect::<Result<_, _>>()?;
-        let mut is_inside = voxels.of_each(progress, |place| voxels.value(place).is_some())?;
-        is_inside.extend([false; 2]);
-        let extinction_rgb = receivers.volume.material.extinction_rgb;
-        Ok(Some(Self { of_lights, is_inside, width: voxels.width as f32, extinction_rgb }))
+        let parts = (receivers.voxels.count() as usize).div_ceil(TOGETHER);
+        let unasked = || std::iter::repeat_with(OnceLock::new).take(parts).collect();
+        let within = |lit: &LitBy<'a>| lit.shadow.map(|shadow| LightWithin { lit: *lit, shadow, parts: unasked() });
+        Some(Self {
+            volume: *volume,
+            lights: lights.iter().map(within).collect(),
+            voxels: VoxelReceivers::new(receivers, origin),
+            axes: volume.axes(),
+            width: width(receivers),
+        })
     }
 
     /// Puts what the eye gets of a light in the place of what arrives at the middle, `through`, in the lanes whose medium is thick.
     pub(crate) fn replace(
         &self,
+        neighbours: &Neighbours,
+        voxels: &Voxels,
         cells: &Cells,
         light: usize,
         parts: &[RayPart; MAX_LANES],
         through: &mut [[f32; MAX_LANES]; 3],
     ) {
-        let Some(slopes) = self.of_lights[light].as_deref() else {
+        let Some(light) = &self.lights[light] else {
             return;
         };
-        let greatest = self.extinction_rgb.iter().fold(0.0f32, |most, e| most.max(*e));
+        let extinction = self.volume.material.extinction_rgb;
+        let thickest = extinction.iter().fold(0.0f32, |most, e| most.max(*e)) * self.width as f32;
         for lane in lanes(cells.lane_bits) {
             let part = &parts[lane];
-            let weight = thickness(part.optical_depth * greatest * self.width / part.length);
+            let weight = thickness(part.optical_depth * thickest / part.length);
             // Of no length nothing is seen, and the weight is no number.
             if weight.is_nan() || weight <= 0.0 {
                 continue;
             }
-            let Some(about) = self.mean(slopes, &cells.ranks[lane], &cells.weights[lane]) else {
+            let slopes = |rank| *light.slopes(rank, || self.slopes(light, neighbours.voxel(voxels, rank)));
+            let Some(about) = mean_of_voxels(&cells.ranks[lane], &cells.weights[lane], slopes) else {
                 continue;
             };
             for channel in 0..3 {
@@ -95,35 +113,75 @@ impl Within {
                 let slope = Vec3::from_array(slope);
                 let middle = absorbance - slope.dot(part.middle);
                 let growth = slope.dot(part.to_eye);
-                let sent = share(middle, growth, part.optical_depth * self.extinction_rgb[channel]);
+                let sent = share(middle, growth, part.optical_depth * extinction[channel]);
                 through[channel][lane] += weight * (sent - through[channel][lane]);
             }
         }
     }
 
-    /// The weighted mean of the voxels of a cell that lie in the volume.
-    fn mean(&self, slopes: &[Slopes], ranks: &[usize; 4], weights: &[[f32; 2]; 4]) -> Option<Slopes> {
-        let mut sum = [[0.0; 4]; 3];
-        let mut whole = 0.0;
-        for (first, weights) in ranks.iter().zip(weights) {
-            for (rank, weight) in (*first..).zip(weights) {
-                if !self.is_inside[rank] {
-                    continue;
-                }
-                whole += weight;
-                for (sum, number) in sum.as_flattened_mut().iter_mut().zip(slopes[rank].as_flattened()) {
-                    *sum += weight * number;
-                }
-            }
+    /// The slopes of a light at a voxel; `None` outside of the volume.
+    fn slopes(&self, light: &LightWithin<'_>, voxel: VoxelPlace) -> Option<Slopes> {
+        let place = self.voxels.place(voxel);
+        let in_lattice = self.voxels.in_lattice(place);
+        let value = self.volume.value_at(in_lattice)?;
+        let receiver = self.voxels.receiver(place);
+        let straight = f64::from(self.volume.transfer.at(value).extinction) * self.volume.extinction_scale * self.width;
+        let optical_depth = self.volume.material.extinction_rgb.map(|factor| factor * straight as f32);
+        if optical_depth.iter().all(|depth| *depth <= PART * THIN) {
+            return Some(light.shadow.absorbance(&receiver).map(|middle| [middle, 0.0, 0.0, 0.0]));
         }
-        (whole > 0.0).then(|| sum.map(|channel| channel.map(|number| number / whole)))
+        let world = self.volume.origin() + self.axes * in_lattice;
+        let to_light = light.lit.light.irradiance(world, 0.0).to_light;
+        let Receiver { position, radius, .. } = receiver;
+        let width = self.width as f32;
+        let cell = MediumCell { position, width, radius, optical_depth, absorbs: self.volume.casts_shadow };
+        let depths = cell.depths(light.shadow, to_light.as_vec3().normalize_or_zero());
+        Some(depths.map(|depth| {
+            let slope = self.axes.transpose() * (depth.across.as_dvec3() / self.width);
+            let here = f64::from(depth.middle()) + slope.dot(place);
+            [here as f32, slope.x as f32, slope.y as f32, slope.z as f32]
+        }))
     }
 
     /// Bytes of that of so many voxels, if the volume is thick.
     pub(crate) fn bytes(receivers: &Receivers<'_>, voxels: u64, lights: &[LitBy<'_>]) -> u64 {
         let shadows = lights.iter().filter(|lit| lit.shadow.is_some()).count();
-        if shadows > 0 && is_thick(receivers) { voxels * (shadows * size_of::<Slopes>() + 1) as u64 } else { 0 }
+        let of_voxel = size_of::<Part>().div_ceil(TOGETHER) + 1;
+        if shadows > 0 && is_thick(receivers) { voxels * (shadows * of_voxel) as u64 } else { 0 }
     }
+}
+
+impl LightWithin<'_> {
+    /// The slopes of a voxel by its rank; `find` finds them where nobody has asked yet. Whoever is first finds what any other would.
+    #[inline]
+    fn slopes(&self, rank: usize, find: impl FnOnce() -> Option<Slopes>) -> &Option<Slopes> {
+        let part = self.parts[rank / TOGETHER].get_or_init(|| Box::new([const { OnceLock::new() }; TOGETHER]));
+        part[rank % TOGETHER].get_or_init(find)
+    }
+}
+
+/// The weighted mean of the voxels of a cell that lie in the volume: two neighbours have ranks beside each other.
+#[inline]
+fn mean_of_voxels(
+    ranks: &[usize; 4],
+    weights: &[[f32; 2]; 4],
+    slopes: impl Fn(usize) -> Option<Slopes>,
+) -> Option<Slopes> {
+    let mut sum = [[0.0; 4]; 3];
+    let mut whole = 0.0;
+    for (first, weights) in ranks.iter().zip(weights) {
+        // A voxel that is missing has no weight.
+        for (rank, weight) in (*first..).zip(weights).filter(|(_, weight)| **weight > 0.0) {
+            let Some(slopes) = slopes(rank) else {
+                continue;
+            };
+            whole += weight;
+            for (sum, number) in sum.as_flattened_mut().iter_mut().zip(slopes.as_flattened()) {
+                *sum += weight * number;
+            }
+        }
+    }
+    (whole > 0.0).then(|| sum.map(|channel| channel.map(|number| number / whole)))
 }
 
 /// Mean step of a volume's lattice, world units.
@@ -139,97 +197,8 @@ pub(crate) fn is_thick(receivers: &Receivers<'_>) -> bool {
     straight * width(receivers) > f64::from(THIN)
 }
 
-/// Rows of voxels that are looked up together.
-const ROWS: usize = 64;
-
 /// Share of [`THIN`] below which a voxel's slopes are not looked up: what is mixed of it and of thick ones is thin.
 const PART: f32 = 0.25;
-
-/// The needed voxels of a volume as cells that receive light.
-struct VoxelDepths<'a, 'v> {
-    receivers: &'a Receivers<'v>,
-    axes: DMat3,
-    /// World position of the lattice's first point, and that of what positions of receivers are relative to.
-    start: DVec3,
-    origin: DVec3,
-    width: f64,
-}
-
-impl<'a, 'v> VoxelDepths<'a, 'v> {
-    fn new(receivers: &'a Receivers<'v>, origin: DVec3) -> Self {
-        Self {
-            receivers,
-            axes: receivers.volume.axes(),
-            start: receivers.volume.origin(),
-            origin,
-            width: width(receivers),
-        }
-    }
-
-    /// What `make` makes of the place of each needed voxel, in lattice coordinates from the rim on.
-    fn of_each<T: Send>(&self, progress: &Progress, make: impl Fn(DVec3) -> T + Sync) -> Result<Vec<T>, Error> {
-        let [nx, ny, nz] = self.receivers.voxels.dims();
-        let shifts = [0, 1].map(|k| self.receivers.volume.packing.shift(k + self.receivers.rim[2] % 2));
-        let rows: Vec<usize> = (0..ny * nz).collect();
-        let of_rows = |rows: &[usize]| {
-            progress.tick(0).map_err(cancelled)?;
-            let mut made = Vec::new();
-            for row in rows {
-                let shift = shifts[row / ny % 2];
-                for i in (0..nx).filter(|i| self.receivers.voxels.has(*i, row % ny, row / ny)) {
-                    made.push(make(DVec3::new(i as f64 + shift, (row % ny) as f64 + shift, (row / ny) as f64)));
-                }
-            }
-            Ok(made)
-        };
-        let parts = rows.par_chunks(ROWS).map(of_rows).collect::<Result<Vec<Vec<T>>, Error>>()?;
-        Ok(parts.into_iter().flatten().collect())
-    }
-
-    /// The value at a place; `None` outside of the volume.
-    fn value(&self, place: DVec3) -> Option<f32> {
-        self.receivers.volume.value_at(place - DVec3::from_array(self.receivers.rim.map(|n| n as f64)))
-    }
-
-    /// The slopes of a light at all needed voxels, and two more.
-    fn slopes_of_light(
-        &self,
-        lit: &LitBy<'_>,
-        shadow: &dyn Transmittance,
-        progress: &Progress,
-    ) -> Result<Vec<Slopes>, Error> {
-        let mut slopes = self.of_each(progress, |place| self.slopes(lit, shadow, place))?;
-        // Voxels are read by two, and one that is missing has the rank of the next.
-        slopes.extend([[[0.0; 4]; 3]; 2]);
-        Ok(slopes)
-    }
-
-    fn slopes(&self, lit: &LitBy<'_>, shadow: &dyn Transmittance, place: DVec3) -> Slopes {
-        let volume = self.receivers.volume;
-        let Some(value) = self.value(place) else {
-            return [[0.0; 4]; 3];
-        };
-        let world = self.start + self.axes * (place - DVec3::from_array(self.receivers.rim.map(|n| n as f64)));
-        let position = (world - self.origin).as_vec3();
-        let receiver =
-            Receiver { position, normal: Vec3::ZERO, radius: self.receivers.radius, kind: SplatKind::Medium };
-        let straight = f64::from(volume.transfer.at(value).extinction) * volume.extinction_scale * self.width;
-        let optical_depth = volume.material.extinction_rgb.map(|factor| factor * straight as f32);
-        if optical_depth.iter().all(|depth| *depth <= PART * THIN) {
-            return shadow.absorbance(&receiver).map(|middle| [middle, 0.0, 0.0, 0.0]);
-        }
-        let to_light = lit.light.irradiance(world, 0.0).to_light;
-        let width = self.width as f32;
-        let cell =
-            MediumCell { position, width, radius: self.receivers.radius, optical_depth, absorbs: volume.casts_shadow };
-        let depths = cell.depths(shadow, to_light.as_vec3().normalize_or_zero());
-        depths.map(|depth| {
-            let slope = self.axes.transpose() * (depth.across.as_dvec3() / self.width);
-            let here = f64::from(depth.middle()) + slope.dot(place);
-            [here as f32, slope.x as f32, slope.y as f32, slope.z as f32]
-        })
-    }
-}
 
 /// Share of a light that the eye gets of what a part of a ray sends: `middle` is the absorbance toward the light in its middle, which grows by
 /// `growth` away from the eye, and `optical_depth` is that of the part.

@@ -25,6 +25,14 @@ pub(crate) struct VoxelPair {
     pub(crate) has_second: bool,
 }
 
+/// Where a voxel lies: its numbers along the axes of the lattice with its rim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct VoxelPlace {
+    pub(crate) i: usize,
+    pub(crate) j: usize,
+    pub(crate) k: usize,
+}
+
 /// A set of voxels, a bit each; the bits behind the last voxel of a row are of no meaning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Voxels {
@@ -103,6 +111,18 @@ impl Voxels {
             has_first: pair & 1 != 0,
             has_second: pair & 2 != 0,
         }
+    }
+
+    /// The voxel of the set before which there are `rank` others, with the `ranks` of [`Voxels::ranks`].
+    pub(crate) fn nth(&self, ranks: &[u64], rank: usize) -> VoxelPlace {
+        let word_index = ranks.partition_point(|before| *before <= rank as u64) - 1;
+        let mut word = self.bits[word_index] & self.inside(word_index);
+        for _ in ranks[word_index]..rank as u64 {
+            word &= word - 1;
+        }
+        let row = word_index / self.words;
+        let i = word_index % self.words * 64 + word.trailing_zeros() as usize;
+        VoxelPlace { i, j: row % self.dims[1], k: row / self.dims[1] }
     }
 
     /// The bits of a word that are voxels.
@@ -343,6 +363,11 @@ mod tests {
                 count += u64::from(!is_hidden(c));
             }
             assert_eq!(found.count(), count);
+            let ranks = found.ranks();
+            let in_order = voxels_between([0; 3], dims).filter(|[i, j, k]| found.has(*i, *j, *k));
+            for (rank, [i, j, k]) in in_order.enumerate() {
+                assert_eq!(found.nth(&ranks, rank), VoxelPlace { i, j, k });
+            }
             assert!(count > 0 && count < (nx * ny * nz) as u64, "{count}");
         }
     }

@@ -445,7 +445,7 @@ impl OneSlab<'_> {
         };
         let cells = shadows.neighbours.cells(simd, voxels, places, bits(is_wanted));
         for light in 0..lighting.light.iter().len() + lighting.mapped.len() {
-            others.push(stored(&shadows.transmittance(simd, &cells, light)));
+            others.push(stored(&shadows.transmittance(simd, voxels, &cells, light)));
         }
     }
 

@@ -384,17 +384,19 @@ impl Shader<'_> {
         if volume.material.shading != Shading::Unlit {
             let mut through = [simd.lanes(1.0); 3];
             if let Some(shadows) = &reconstructed.prepared.shadows {
-                let cells = shadows.neighbours.cells(simd, &reconstructed.prepared.voxels, &spots.places, lane_bits);
+                let voxels = &reconstructed.prepared.voxels;
+                let cells = shadows.neighbours.cells(simd, voxels, &spots.places, lane_bits);
                 let within = reconstructed.prepared.within.as_ref();
                 let mut ray_parts = [RayPart::default(); MAX_LANES];
                 if within.is_some() {
                     ray_parts = parts(shadows.neighbours.lattice_from_place, spots, medium);
                 }
                 for (rank, lamp) in self.lamps.iter().enumerate() {
-                    through = shadows.transmittance(simd, &cells, rank);
+                    through = shadows.transmittance(simd, voxels, &cells, rank);
                     if let Some(within) = within {
-                        through =
-                            within_lanes(simd, through, |shares| within.replace(&cells, rank, &ray_parts, shares));
+                        through = within_lanes(simd, through, |shares| {
+                            within.replace(&shadows.neighbours, voxels, &cells, rank, &ray_parts, shares);
+                        });
                     }
                     reflector.add(simd, lamp, spots, &through, &mut lit);
                 }

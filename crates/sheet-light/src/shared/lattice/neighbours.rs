@@ -2,10 +2,11 @@
 
 use crate::Volume;
 use crate::shared::vectors::NATURAL;
-use crate::shared::voxels::{VoxelPair, Voxels};
-use splat_core::Packing;
+use crate::shared::voxels::{VoxelPair, VoxelPlace, Voxels};
+use splat_core::glam::{DMat3, DVec3, Vec3};
 use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
+use splat_core::{Packing, Receiver, SplatKind};
 
 /// The needed voxels of a volume, and where they are.
 pub(crate) struct Receivers<'a> {
@@ -17,6 +18,18 @@ pub(crate) struct Receivers<'a> {
     pub(crate) radius: f32,
     /// Rows of what leads from places, as they will be asked for, to lattice coordinates.
     pub(crate) rows: [[f64; 4]; 3],
+}
+
+/// Voxels as they receive light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct VoxelReceivers {
+    /// The first voxel of the lattice, relative to what receivers are, and the voxels of the rim before it along each axis.
+    start: DVec3,
+    rim: DVec3,
+    axes: DMat3,
+    /// How far planes are shifted, in steps along each of their axes: those of even index, then the others.
+    shifts: [f64; 2],
+    radius: f32,
 }
 
 /// How places lead to voxels.
@@ -38,6 +51,37 @@ pub(crate) struct Cells {
     pub(crate) lane_bits: u32,
 }
 
+impl VoxelReceivers {
+    /// Those of a volume, relative to `origin`.
+    pub(crate) fn new(receivers: &Receivers<'_>, origin: DVec3) -> Self {
+        let Receivers { volume, rim, radius, .. } = *receivers;
+        Self {
+            start: volume.origin() - origin,
+            rim: DVec3::from_array(rim.map(|n| n as f64)),
+            axes: volume.axes(),
+            shifts: [0, 1].map(|k| volume.packing.shift(k + rim[2] % 2)),
+            radius,
+        }
+    }
+
+    /// Where a voxel lies, in lattice coordinates from the rim on.
+    pub(crate) fn place(&self, voxel: VoxelPlace) -> DVec3 {
+        let shift = self.shifts[voxel.k % 2];
+        DVec3::new(voxel.i as f64 + shift, voxel.j as f64 + shift, voxel.k as f64)
+    }
+
+    /// The same from the first voxel of the lattice on.
+    pub(crate) fn in_lattice(&self, place: DVec3) -> DVec3 {
+        place - self.rim
+    }
+
+    /// What receives light at a place.
+    pub(crate) fn receiver(&self, place: DVec3) -> Receiver {
+        let position = (self.start + self.axes * self.in_lattice(place)).as_vec3();
+        Receiver { position, normal: Vec3::ZERO, radius: self.radius, kind: SplatKind::Medium }
+    }
+}
+
 impl Neighbours {
     /// Bytes of those of so many voxels.
     pub(crate) fn bytes(voxels: u64) -> u64 {
@@ -51,6 +95,11 @@ impl Neighbours {
         let lattice_from_place = rows.map(|row| row.map(|v| v as f32));
         let is_first_shifted = (receivers.volume.packing == Packing::BodyCentred).then_some(receivers.rim[2] % 2 == 1);
         Self { ranks: receivers.voxels.ranks(), is_first_shifted, lattice_from_place }
+    }
+
+    /// Which one of the needed voxels is that of a rank.
+    pub(crate) fn voxel(&self, voxels: &Voxels, rank: usize) -> VoxelPlace {
+        voxels.nth(&self.ranks, rank)
     }
 
     /// The needed voxels around places.
