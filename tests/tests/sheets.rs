@@ -101,7 +101,7 @@ fn explain_says_which_form_draws_and_why() {
         String::from_utf8(output.stdout).unwrap().split_whitespace().collect::<Vec<_>>().join(" ")
     };
     for (settings, form, reason) in [
-        (&[][..], "gathered slabs", "a quarter of the voxels or more has extinction"),
+        (&[][..], "gathered slabs", "a twentieth of the voxels or more has extinction"),
         (&["render.sheets.kernel='linear'"], "linearly gathered slabs", "the scene asks for it"),
         (&["render.sheets.reconstruction='splat'"], "splatted slabs", "the scene asks for it"),
         (&["render.sheets.kernel_extent=3"], "splatted slabs", "a kernel that is splatted alone"),
@@ -113,8 +113,12 @@ fn explain_says_which_form_draws_and_why() {
         (HALF_AND_KERNEL, "splatted slabs", "a kernel that is splatted alone"),
         (HALF_AND_FINE, "splatted slabs", "finer than samples"),
         (&["object.ball.density.spacing=0.02"], "splatted slabs", "finer than samples"),
-        (&["object.ball.density.spacing=0.2"], "splatted slabs", "wider than five samples"),
-        (&["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.8'"], "splatted slabs", "fewer than a quarter"),
+        (&["object.ball.density.spacing=0.2"], "gathered slabs", "a twentieth of the voxels or more"),
+        (
+            &["object.ball.density.expression='exp(-2*(x^2+y^2+z^2)) - 0.95'"],
+            "splatted slabs",
+            "fewer than a twentieth",
+        ),
     ] {
         let text = explained(settings);
         assert!(text.contains(form), "{settings:?}: no `{form}` in {text}");

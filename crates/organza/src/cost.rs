@@ -35,7 +35,7 @@ pub(crate) struct OwnWork {
     pub(crate) items: f64,
     /// Particles of a set over all ranges that take longer, by what they are found in.
     pub(crate) particles: FoundParticles,
-    /// Samples of the picture that a slab of sheets covers, times slabs and lights.
+    /// Samples of the picture that show in slabs of sheets, by what each takes over reading and classifying it.
     pub(crate) slab_samples: f64,
     /// Rows of footprints in slabs of sweeps.
     pub(crate) swept_rows: f64,

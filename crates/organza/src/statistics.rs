@@ -60,6 +60,8 @@ pub struct MediumFacts {
     pub splats: f64,
     /// A box around it.
     pub bounds: DAabb,
+    /// Length of the camera's rays along which it shows, up to where next to nothing passes it: mean over the picture.
+    pub shown_length: f64,
     /// Whether it lies on a lattice, so that slabs reconstruct it.
     pub is_lattice: bool,
     /// Irradiance in its middle without shadows, all lights together, in the channel that has most, W/m².

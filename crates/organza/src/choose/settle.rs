@@ -294,7 +294,8 @@ fn seconds(row: &Row, asked: &Asked<'_>) -> f64 {
     let scene = asked.scene;
     let camera = scene.camera.with_samples(asked.settings.antialias);
     let own_work = (row.foresees)(asked, &camera);
-    let draws_own_data = own_work.items + own_work.medium_samples + own_work.polygon_looks > 0.0;
+    let drawn_items = own_work.items + own_work.slab_samples + own_work.medium_samples + own_work.polygon_looks;
+    let draws_own_data = drawn_items > 0.0;
     let samples = samples(scene);
     let casting = scene.lights.iter().filter(|light| light.shadow && light.light.intensity != [0.0; 3]);
     let maps: f64 = casting.map(|light| light.count() as f64).sum();

@@ -80,7 +80,7 @@ pub enum Item {
     SweptRow,
     /// A sample of a light's image that is moved for a point of a light with a size, in one slab.
     SoftSample,
-    /// A sample that a slab covers, for each light.
+    /// A sample that shows in a slab, read between 8 voxels and classified; what takes longer counts several times.
     SlabSample,
     /// A sample of the eye's image or a light's that reads a volume in a slab across a half vector.
     MediumSample,
@@ -170,10 +170,10 @@ static TABLE: [Row; 46] = [
     row(Item::SurveyedVoxel, "surveyed_voxel", "voxels", pass::SAMPLERS, 30.0, 0.9),
     row(Item::SearchedCell, "searched_cell", "cells about points", pass::SAMPLERS, 1.3e4, 0.9),
     row(Item::SetSample, "set_sample", "samples of sets", pass::PARTICLES, 170.0, 0.95),
-    row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 37.0, 0.9),
+    row(Item::SheetFragment, "sheet_fragment", "fragments", pass::SHEETS, 4.0, 0.9),
     row(Item::SweptRow, "swept_row", "rows of footprints", pass::SHEETS, 110.0, 0.9),
     row(Item::SoftSample, "soft_sample", "moved samples of lights", pass::SHEETS, 0.5, 0.9),
-    row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 95.0, 0.9),
+    row(Item::SlabSample, "slab_sample", "samples of slabs", pass::SHEETS, 42.0, 0.9),
     row(Item::MediumSample, "medium_sample", "samples of volumes in slabs", pass::SHEETS, 540.0, 0.9),
     row(Item::PolygonLook, "polygon_look", "looks of lights at polygons", pass::SHEETS, 55.0, 0.9),
     row(Item::SurfelDisc, "surfel_disc", "discs", pass::SURFELS, 550.0, 0.9),

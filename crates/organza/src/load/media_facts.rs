@@ -6,6 +6,7 @@ use super::light_statistics;
 use super::loading::Loading;
 use super::object_context::ObjectContext;
 use crate::Error;
+use crate::frame::extent::{SlantedBox, shown_length};
 use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, SourceData, VolumeSource};
 use crate::statistics::MediumFacts;
 use convert::MediumBody;
@@ -102,6 +103,12 @@ impl Sampled {
         starts.map(of_line).fold(0.0, f64::max) * length / count as f64
     }
 
+    /// Extinction in the part of the box that a place is in, given in parts of its edges.
+    fn at(&self, place: DVec3) -> f64 {
+        let cell = |axis: usize| ((place[axis] * self.places[axis] as f64) as usize).min(self.places[axis] - 1);
+        self.extinctions[(cell(2) * self.places[1] + cell(1)) * self.places[0] + cell(0)]
+    }
+
     /// The facts; `None` where there is nothing that takes light, or nothing is in view.
     fn facts(&self, scene: &Scene, id: usize) -> Option<MediumFacts> {
         let object = &scene.objects[id];
@@ -123,16 +130,15 @@ impl Sampled {
         let factor = f64::from(material.greatest_extinction());
         let occupied = self.extinctions.iter().filter(|e| **e > 0.0).count() as f64 / self.extinctions.len() as f64;
         let volume = self.edges.determinant().abs() * transform.scale.powi(3);
-        let corners = (0..8).map(|corner| {
-            let part = DVec3::new((corner & 1) as f64, (corner >> 1 & 1) as f64, (corner >> 2) as f64);
-            transform.apply(self.corner + self.edges * part)
-        });
-        let bounds = DAabb::of_points(corners);
+        let hull = SlantedBox::of(self.corner, self.edges, &transform);
+        let bounds = DAabb::of_points(hull.corners());
         // An animation may bring it into view.
         if scene.frames.is_none() && !scene.camera.may_see_hull(&bounds.corners()) {
             return None;
         }
         let light = light_at(scene, &bounds);
+        let cutoff = scene.render.sheets.transmittance_cutoff;
+        let shown_length = shown_length(&hull, &scene.camera, cutoff, |place| factor * self.at(place));
         let greatest = self.extinctions.iter().copied().fold(0.0, f64::max);
         Some(MediumFacts {
             object: id,
@@ -143,6 +149,7 @@ impl Sampled {
             spacing: self.spacing,
             splats: (occupied * volume / self.spacing.powi(3)).max(1.0),
             bounds,
+            shown_length,
             is_lattice: self.is_lattice,
             irradiance: light.irradiance,
             outside_share: light.outside_share,

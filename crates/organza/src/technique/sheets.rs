@@ -10,6 +10,7 @@ mod reconstruction;
 
 use crate::cost::{Count, Item, Translucent};
 use crate::form::Form;
+use crate::frame::extent::{SlantedBox, shown_length};
 use crate::frame::matter::Matter;
 use crate::frame::{Extent, Frame, Shaded};
 use crate::load::Loaded;
@@ -25,8 +26,9 @@ use sheet_light::{
     Aligned, Classify, GatherKernel, Gradients, KernelShape, Lighting, Params, Reconstruction, SheetInput, Sheeted,
     Splats, Volume, prepare,
 };
+use splat_core::glam::{DMat3, DVec3};
 use splat_core::raster::OpaqueImage;
-use splat_core::{Accumulator, Camera, DAabb, Direction, Grid, Limits, Packing, TransferFunction};
+use splat_core::{Accumulator, Camera, DAabb, Direction, Grid, Limits, Packing, Shading, TransferFunction};
 use std::ops::Range;
 
 /// Bytes of a sample that slabs across half vectors see or light, of a volume more there, of a cell of scattered light in both streams, and of a voxel.
@@ -38,8 +40,18 @@ const BYTES_OF_A_VOXEL: f64 = 120.0;
 const VOXELS_OF_A_CELL: u64 = 32;
 const LEAST_CELLS: u64 = 1 << 16;
 
-/// Time of a sample of slabs that is read between 8 voxels, over that of one by the 64 of the Gaussian kernel.
-const LINEAR_SAMPLE: f64 = 0.4;
+/// Times of one sample in one slab, over that of reading it between 8 voxels and classifying it, fitted to `scenes/head.toml` and `scenes/levels.toml`: reading it by the
+/// 64 voxels of the Gaussian kernel, lighting it by a light, and by one that has a shadow map.
+const GAUSSIAN_SAMPLE: f64 = 2.0;
+const LIT_SAMPLE: f64 = 0.3;
+const SHADOWED_SAMPLE: f64 = 1.3;
+/// The same of a voxel that a shadow map is asked at, and of one of a lattice: filtered before its pixels are read, or found to show something or nothing.
+const SHADOWED_VOXEL: f64 = 16.0;
+const FILTERED_VOXEL: f64 = 0.35;
+const SOUGHT_VOXEL: f64 = 0.1;
+
+/// Voxels that a sample is interpolated between.
+const CORNERS: f64 = 8.0;
 
 /// The form in which an object is taken.
 pub(crate) fn form(object: &ObjectStatistics) -> (Form, &'static str) {
@@ -90,14 +102,37 @@ pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     }
     let Some(medium) = asked.medium().filter(|medium| medium.is_lattice) else { return OwnWork::default() };
     let shining = asked.scene.lights.iter().filter(|light| light.light.intensity != [0.0; 3]);
-    let lights: f64 = shining.map(|light| light.count() as f64).sum();
-    let seen = Extent::new(&medium.bounds, camera);
-    let radius = asked.settings.sheets.kernel_extent * medium.spacing * seen.samples_per_unit;
-    let slabs = medium.bounds.diagonal() / medium.spacing;
-    OwnWork {
-        items: medium.splats * seen.share * (std::f64::consts::PI * radius * radius).max(1.0),
-        slab_samples: seen.samples * slabs * (1.0 + lights),
-        ..OwnWork::default()
+    let mut lamps = Lamps::default();
+    shining.for_each(|light| lamps.add(light.count() as f64, light.shadow));
+    let samples = camera.pixels() as f64 * medium.shown_length / medium.spacing;
+    let wide = medium.spacing * Extent::new(&medium.bounds, camera).samples_per_unit;
+    let voxels = (medium.bounds.max - medium.bounds.min).element_product() / medium.spacing.powi(3);
+    // What shows little is splatted, in about the same time.
+    let slab_samples = samples * (GAUSSIAN_SAMPLE + lamps.of_a_sample(wide)) + FILTERED_VOXEL * voxels;
+    OwnWork { slab_samples, ..OwnWork::default() }
+}
+
+/// Lights that shine, and those of them that have a shadow map.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lamps {
+    bare: f64,
+    shadowed: f64,
+}
+
+impl Lamps {
+    fn add(&mut self, count: f64, has_shadow: bool) {
+        if has_shadow {
+            self.shadowed += count;
+        } else {
+            self.bare += count;
+        }
+    }
+
+    /// What they take of a sample, with the voxels about it that nobody has asked shadows for, where a voxel is so many samples wide.
+    fn of_a_sample(&self, wide: f64) -> f64 {
+        // What is shown has voxels within and about as many beside it.
+        let voxels = CORNERS.min(2.0 / (wide * wide));
+        self.bare * LIT_SAMPLE + self.shadowed * (SHADOWED_SAMPLE + voxels * SHADOWED_VOXEL)
     }
 }
 
@@ -120,22 +155,69 @@ pub(crate) fn foresees_bytes(scene: &Scene, settings: &scene::RenderSettings, me
     eyes + light + cells + polygons + (BYTES_OF_A_VOXEL * voxels) as u64
 }
 
-/// Voxels with extinction, as slabs across the view meet them; half-vector slicing sweeps them once for each light, for the eye and for the light.
+/// Samples that slabs show, and fragments of voxels; half-vector slicing sweeps voxels once for each light, for the eye and for the light.
 fn own_work(frame: &Frame<'_>) -> OwnWork {
+    if half::is_asked(frame.scene) { swept_work(frame) } else { work_across_the_view(frame) }
+}
+
+/// Of slabs across the view.
+fn work_across_the_view(frame: &Frame<'_>) -> OwnWork {
+    let settings = &frame.settings.sheets;
+    let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
+    let mut lamps = Lamps::default();
+    for (rank, point) in frame.light_points().iter().enumerate() {
+        if point.light.intensity != [0.0; 3] {
+            lamps.add(1.0, !frame.casting(rank).is_empty());
+        }
+    }
+    let volume_work = |native: &Own| {
+        let Body::Cells { grid, transfer, .. } = &native.body else { return OwnWork::default() };
+        let material = &frame.scene.materials[native.material].material;
+        let dims = DVec3::from_array(grid.dims.map(|count| count as f64));
+        let corner = grid.origin - grid.axes * DVec3::splat(0.5);
+        let hull = SlantedBox::of(corner, grid.axes * DMat3::from_diagonal(dims), &native.transform);
+        let per_world = native.extinction_scale / native.transform.scale;
+        let extinction = |place: DVec3| {
+            let [i, j, k] = (place * dims - 0.5).round().to_array().map(|index| index as isize);
+            f64::from(transfer.at(grid.at_clamped(i, j, k)).extinction) * per_world
+        };
+        let length = shown_length(&hull, &frame.camera, settings.transmittance_cutoff, extinction);
+        let step = grid.shortest_step() * native.transform.scale;
+        let samples = frame.camera.pixels() as f64 * length / step;
+        let wide = step * Extent::new(&native.world_box(), &frame.camera).samples_per_unit;
+        let lit = if material.shading == Shading::Unlit { 0.0 } else { lamps.of_a_sample(wide) };
+        let voxels = grid.values.len() as f64;
+        match form.reconstruction {
+            Reconstruction::Splat => {
+                // Each voxel covers so many samples, at least one.
+                let kernels = (std::f64::consts::PI * settings.kernel_extent.powi(2)).max(1.0 / (wide * wide));
+                let slab_samples = samples * (1.0 + lit) + SOUGHT_VOXEL * voxels;
+                OwnWork { items: samples * kernels, slab_samples, ..OwnWork::default() }
+            }
+            Reconstruction::Gather(kernel) => {
+                let (read, prepared) = match kernel {
+                    GatherKernel::Gaussian => (GAUSSIAN_SAMPLE, FILTERED_VOXEL),
+                    GatherKernel::Linear => (1.0, SOUGHT_VOXEL),
+                };
+                OwnWork { slab_samples: samples * (read + lit) + prepared * voxels, ..OwnWork::default() }
+            }
+        }
+    };
+    let natives = frame.loaded.own.iter().filter(|native| native.technique == Technique::Sheets);
+    let mut sum = OwnWork::default();
+    for work in natives.map(volume_work) {
+        sum.items += work.items;
+        sum.slab_samples += work.slab_samples;
+    }
+    sum
+}
+
+/// Of slabs across half vectors.
+fn swept_work(frame: &Frame<'_>) -> OwnWork {
     let shining = frame.light_points().iter().filter(|point| point.light.intensity != [0.0; 3]);
-    let is_half = half::is_asked(frame.scene);
-    let lights = shining.filter(|point| !is_half || half::is_swept(frame.scene, point)).count() as f64;
-    let sweeps = if is_half { lights.max(1.0) } else { 1.0 };
-    let lit = if is_half { 1.0 } else { lights };
+    let sweeps = (shining.filter(|point| half::is_swept(frame.scene, point)).count() as f64).max(1.0);
     let extent = frame.settings.sheets.kernel_extent;
     let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
-    let is_splatted = form.reconstruction == Reconstruction::Splat;
-    // Gathered slabs pass over bricks without extinction.
-    let share_of_samples = match form.reconstruction {
-        Reconstruction::Splat => 1.0,
-        Reconstruction::Gather(GatherKernel::Gaussian) => form.visible,
-        Reconstruction::Gather(GatherKernel::Linear) => LINEAR_SAMPLE * form.visible,
-    };
     let volumes = || frame.loaded.own.iter().filter(|native| native.technique == Technique::Sheets);
     let step_of = |native: &Own| native.grid().map(|grid| grid.shortest_step() * native.transform.scale);
     let least_step = volumes().filter_map(step_of).fold(f64::INFINITY, f64::min);
@@ -143,47 +225,29 @@ fn own_work(frame: &Frame<'_>) -> OwnWork {
         let Body::Cells { grid, transfer, .. } = &native.body else { return OwnWork::default() };
         let seen = Extent::new(&native.world_box(), &frame.camera);
         let step = grid.shortest_step() * native.transform.scale;
-        let radius = extent * step * seen.samples_per_unit;
-        let voxels = native.voxels() as f64;
-        let slabs = native.world_box().diagonal() / step;
-        let fragments = voxels * seen.share * (std::f64::consts::PI * radius * radius).max(1.0);
-        // A kernel reaches into so many slabs, which are as wide as the least step, and has rows in the images of the eye and of the light.
-        let sections = 2.0 * extent * step / least_step + 1.0;
-        let rows_of_eye = seen.share * rows(radius);
-        let rows_of_light = rows(extent * half::light_pixels(frame.scene) * step / least_step);
+        if form.reconstruction == Reconstruction::Splat {
+            // A kernel reaches into so many slabs, which are as wide as the least step, and has rows in the images of the eye and of the light.
+            let sections = 2.0 * extent * step / least_step + 1.0;
+            let rows_of_eye = seen.share * rows(extent * step * seen.samples_per_unit);
+            let rows_of_light = rows(extent * half::light_pixels(frame.scene) * step / least_step);
+            let swept_rows = sweeps * shaping_voxels(grid, transfer) * sections * (rows_of_eye + rows_of_light);
+            return OwnWork { swept_rows, ..OwnWork::default() };
+        }
         // Samples of a voxel in the images of the eye and of the light.
         let unit = libm::exp2(f64::from(-frame.loaded.exponent));
         let slabs_of_voxel = step / frame.settings.sheets.slab_width.map_or(least_step, |width| width * unit);
         let eye = seen.share * (step * seen.samples_per_unit).powi(2);
         let light = (half::light_pixels(frame.scene) * step / least_step).powi(2);
-        OwnWork {
-            items: if is_splatted && !is_half { fragments } else { 0.0 },
-            slab_samples: if is_half { 0.0 } else { seen.samples * slabs * (1.0 + lit) * share_of_samples },
-            medium_samples: if is_half && !is_splatted {
-                sweeps * gathered_voxels(grid, transfer) * slabs_of_voxel * (eye + light)
-            } else {
-                0.0
-            },
-            swept_rows: if is_half && is_splatted {
-                sweeps * shaping_voxels(grid, transfer) * sections * (rows_of_eye + rows_of_light)
-            } else {
-                0.0
-            },
-            ..OwnWork::default()
-        }
+        let medium_samples = sweeps * gathered_voxels(grid, transfer) * slabs_of_voxel * (eye + light);
+        OwnWork { medium_samples, ..OwnWork::default() }
     };
     let mut sum = OwnWork::default();
     for work in volumes().map(volume_work) {
-        sum.items += work.items;
-        sum.slab_samples += work.slab_samples;
         sum.swept_rows += work.swept_rows;
         sum.medium_samples += work.medium_samples;
     }
     let bounds = volumes().map(Own::world_box).reduce(DAabb::union);
     let slabs = bounds.map_or(0.0, |bounds| bounds.diagonal() / least_step);
-    if !is_half {
-        return sum;
-    }
     let polygon_looks = half::polygon_looks(frame, sum.medium_samples);
     OwnWork { soft_samples: half::soft_samples(frame, slabs), polygon_looks, ..sum }
 }

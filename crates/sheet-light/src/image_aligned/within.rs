@@ -11,11 +11,13 @@
 
 use crate::Volume;
 use crate::shared::lattice::neighbours::{Cells, Neighbours, Receivers, VoxelReceivers, lanes};
+use crate::shared::vectors::dot;
 use crate::shared::voxels::{VoxelPlace, Voxels};
-use splat_core::glam::{DMat3, DVec3, Vec3};
-use splat_core::raster::lanes::MAX_LANES;
+use splat_core::glam::{DMat3, DVec3};
+use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
+use splat_core::raster::pulp::Simd;
 use splat_core::shade::LitBy;
-use splat_core::shade::joint::{MediumCell, THIN, mean, thickness};
+use splat_core::shade::joint::{MediumCell, THICK, THIN};
 use splat_core::{Receiver, Transmittance};
 use std::sync::OnceLock;
 
@@ -46,16 +48,17 @@ struct LightWithin<'a> {
     parts: Vec<OnceLock<Box<Part>>>,
 }
 
-/// The part of a ray in a slab.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RayPart {
-    /// Its middle, and its way to the eye, in lattice coordinates from the rim on.
-    pub(crate) middle: Vec3,
-    pub(crate) to_eye: Vec3,
-    /// World units.
-    pub(crate) length: f32,
-    /// Optical depth, to be multiplied with the material's extinctions.
-    pub(crate) optical_depth: f32,
+/// The parts of neighbouring rays in a slab of a thick volume.
+pub(crate) struct RayParts<'a, S: Simd> {
+    within: &'a Within<'a>,
+    /// Their middles, in lattice coordinates from the rim on.
+    middle: [Lanes<S>; 3],
+    /// Their ways to the eye, in steps along each axis of the lattice.
+    to_eye: [Lanes<S>; 3],
+    /// To be multiplied with the material's extinctions.
+    optical_depth: Lanes<S>,
+    /// How much the joint integral counts, 0 to 1.
+    weight: Lanes<S>,
 }
 
 impl<'a> Within<'a> {
@@ -82,41 +85,74 @@ impl<'a> Within<'a> {
         })
     }
 
-    /// Puts what the eye gets of a light in the place of what arrives at the middle, `through`, in the lanes whose medium is thick.
-    pub(crate) fn replace(
+    /// The parts of rays about some places, `to_eye` being unit vectors, and lengths in world units.
+    #[inline(always)]
+    pub(crate) fn parts<S: Simd>(
         &self,
+        simd: S,
+        neighbours: &Neighbours,
+        places: &[Lanes<S>; 3],
+        to_eye: &[Lanes<S>; 3],
+        length: Lanes<S>,
+        optical_depth: Lanes<S>,
+    ) -> RayParts<'_, S> {
+        let zero = simd.lanes(0.0);
+        let mut middle = [zero; 3];
+        let mut way = [zero; 3];
+        for axis in 0..3 {
+            let [x, y, z, start] = neighbours.lattice_from_place[axis];
+            let row = [simd.lanes(x), simd.lanes(y), simd.lanes(z)];
+            middle[axis] = dot(&row, places) + simd.lanes(start);
+            way[axis] = dot(&row, to_eye) * length;
+        }
+        let extinction = self.volume.material.extinction_rgb;
+        let thickest = extinction.iter().fold(0.0f32, |most, e| most.max(*e)) * self.width as f32;
+        // Of no length nothing is seen, and what is no number is not thick.
+        let of_spacing = optical_depth * simd.lanes(thickest) / length.max(simd.lanes(f32::MIN_POSITIVE));
+        let thickness = (of_spacing - simd.lanes(THIN)) * simd.lanes(1.0 / (THICK - THIN));
+        RayParts { within: self, middle, to_eye: way, optical_depth, weight: thickness.max(zero).min(simd.lanes(1.0)) }
+    }
+
+    /// Writes the weighted mean of the slopes of the voxels of a cell that lie in the volume, number by number, in the place of a lane. Returns 1, or 0
+    /// where none of them does.
+    #[inline]
+    fn mean_of_voxels(
+        &self,
+        light: &LightWithin<'_>,
         neighbours: &Neighbours,
         voxels: &Voxels,
         cells: &Cells,
-        light: usize,
-        parts: &[RayPart; MAX_LANES],
-        through: &mut [[f32; MAX_LANES]; 3],
-    ) {
-        let Some(light) = &self.lights[light] else {
-            return;
-        };
-        let extinction = self.volume.material.extinction_rgb;
-        let thickest = extinction.iter().fold(0.0f32, |most, e| most.max(*e)) * self.width as f32;
-        for lane in lanes(cells.lane_bits) {
-            let part = &parts[lane];
-            let weight = thickness(part.optical_depth * thickest / part.length);
-            // Of no length nothing is seen, and the weight is no number.
-            if weight.is_nan() || weight <= 0.0 {
-                continue;
-            }
-            let slopes = |rank| *light.slopes(rank, || self.slopes(light, neighbours.voxel(voxels, rank)));
-            let Some(about) = mean_of_voxels(&cells.ranks[lane], &cells.weights[lane], slopes) else {
-                continue;
-            };
-            for channel in 0..3 {
-                let [absorbance, slope @ ..] = about[channel];
-                let slope = Vec3::from_array(slope);
-                let middle = absorbance - slope.dot(part.middle);
-                let growth = slope.dot(part.to_eye);
-                let sent = share(middle, growth, part.optical_depth * extinction[channel]);
-                through[channel][lane] += weight * (sent - through[channel][lane]);
+        lane: usize,
+        slopes: &mut [[f32; MAX_LANES]; 12],
+    ) -> f32 {
+        let mut sum = [0.0; 12];
+        let mut whole = 0.0;
+        for row in 0..4 {
+            for e in 0..2 {
+                let rank = cells.ranks[lane][row] + e;
+                let weight = cells.weights[lane][row][e];
+                // A voxel that is missing has no weight.
+                if weight == 0.0 {
+                    continue;
+                }
+                let found = light.slopes(rank, || self.slopes(light, neighbours.voxel(voxels, rank)));
+                let Some(found) = found else {
+                    continue;
+                };
+                whole += weight;
+                let found = found.as_flattened();
+                for n in 0..12 {
+                    sum[n] += weight * found[n];
+                }
             }
         }
+        if whole == 0.0 {
+            return 0.0;
+        }
+        for n in 0..12 {
+            slopes[n][lane] = sum[n] / whole;
+        }
+        1.0
     }
 
     /// The slopes of a light at a voxel; `None` outside of the volume.
@@ -151,6 +187,48 @@ impl<'a> Within<'a> {
     }
 }
 
+impl<S: Simd> RayParts<'_, S> {
+    /// What the eye gets of a light, in the place of what arrives at the middle, `through`, where the medium is thick.
+    #[inline(always)]
+    pub(crate) fn replace(
+        &self,
+        simd: S,
+        neighbours: &Neighbours,
+        voxels: &Voxels,
+        cells: &Cells,
+        light: usize,
+        through: [Lanes<S>; 3],
+    ) -> [Lanes<S>; 3] {
+        let zero = simd.lanes(0.0);
+        let Some(light) = &self.within.lights[light] else {
+            return through;
+        };
+        if !zero.any_less(self.weight) {
+            return through;
+        }
+        let mut weights = [0.0; MAX_LANES];
+        self.weight.store(&mut weights);
+        let mut slopes = [[0.0; MAX_LANES]; 12];
+        for lane in lanes(cells.lane_bits) {
+            if weights[lane] > 0.0 {
+                weights[lane] *= self.within.mean_of_voxels(light, neighbours, voxels, cells, lane, &mut slopes);
+            }
+        }
+        let weight = Lanes::load(simd, &weights);
+        let mut sent = through;
+        for channel in 0..3 {
+            let [absorbance, x, y, z] = [4 * channel, 4 * channel + 1, 4 * channel + 2, 4 * channel + 3];
+            let slope = [Lanes::load(simd, &slopes[x]), Lanes::load(simd, &slopes[y]), Lanes::load(simd, &slopes[z])];
+            let middle = Lanes::load(simd, &slopes[absorbance]) - dot(&slope, &self.middle);
+            let growth = dot(&slope, &self.to_eye);
+            let optical_depth = self.optical_depth * simd.lanes(self.within.volume.material.extinction_rgb[channel]);
+            let share = share(simd, middle, growth, optical_depth);
+            sent[channel] = weight.mul_add(share - through[channel], through[channel]);
+        }
+        sent
+    }
+}
+
 impl LightWithin<'_> {
     /// The slopes of a voxel by its rank; `find` finds them where nobody has asked yet. Whoever is first finds what any other would.
     #[inline]
@@ -158,30 +236,6 @@ impl LightWithin<'_> {
         let part = self.parts[rank / TOGETHER].get_or_init(|| Box::new([const { OnceLock::new() }; TOGETHER]));
         part[rank % TOGETHER].get_or_init(find)
     }
-}
-
-/// The weighted mean of the voxels of a cell that lie in the volume: two neighbours have ranks beside each other.
-#[inline]
-fn mean_of_voxels(
-    ranks: &[usize; 4],
-    weights: &[[f32; 2]; 4],
-    slopes: impl Fn(usize) -> Option<Slopes>,
-) -> Option<Slopes> {
-    let mut sum = [[0.0; 4]; 3];
-    let mut whole = 0.0;
-    for (first, weights) in ranks.iter().zip(weights) {
-        // A voxel that is missing has no weight.
-        for (rank, weight) in (*first..).zip(weights).filter(|(_, weight)| **weight > 0.0) {
-            let Some(slopes) = slopes(rank) else {
-                continue;
-            };
-            whole += weight;
-            for (sum, number) in sum.as_flattened_mut().iter_mut().zip(slopes.as_flattened()) {
-                *sum += weight * number;
-            }
-        }
-    }
-    (whole > 0.0).then(|| sum.map(|channel| channel.map(|number| number / whole)))
 }
 
 /// Mean step of a volume's lattice, world units.
@@ -201,21 +255,30 @@ pub(crate) fn is_thick(receivers: &Receivers<'_>) -> bool {
 const PART: f32 = 0.25;
 
 /// Share of a light that the eye gets of what a part of a ray sends: `middle` is the absorbance toward the light in its middle, which grows by
-/// `growth` away from the eye, and `optical_depth` is that of the part.
-fn share(middle: f32, growth: f32, optical_depth: f32) -> f32 {
-    let least = (middle - 0.5 * growth.abs()).max(0.0);
-    if growth >= 0.0 {
-        return libm::expf(-least) * mean(growth + optical_depth) / mean(optical_depth);
-    }
-    // e^−x·M(e − x), x the absorbance from the far end to the near one: M of what is negative is e^… of what is positive.
-    let back = -growth;
-    let nearer = back.min(optical_depth);
-    libm::expf(-least - nearer) * mean((back - optical_depth).abs()) / mean(optical_depth)
+/// `growth` away from the eye, and `optical_depth` is that of the part, ≥ 0.
+#[inline(always)]
+fn share<S: Simd>(simd: S, middle: Lanes<S>, growth: Lanes<S>, optical_depth: Lanes<S>) -> Lanes<S> {
+    let zero = simd.lanes(0.0);
+    let least = (middle - simd.lanes(0.5) * growth.abs()).max(zero);
+    // Where light comes from behind, e^−x·M(e − x), x the absorbance from the far end to the near one: M of what is negative is e^… of what is positive.
+    let nearer = (zero - growth).max(zero).min(optical_depth);
+    (least + nearer).exp_neg() * mean(simd, (growth + optical_depth).abs()) / mean(simd, optical_depth)
 }
+
+/// M(x) = (1 − e^−x)/x, x ≥ 0; see [`splat_core::shade::joint::mean`].
+#[inline(always)]
+fn mean<S: Simd>(simd: S, depth: Lanes<S>) -> Lanes<S> {
+    let depth = depth.max(simd.lanes(TINY));
+    depth.opacity() / depth
+}
+
+/// Its M is 1 in single precision.
+const TINY: f32 = 1e-8;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splat_core::raster::pulp;
 
     #[test]
     fn a_part_of_a_ray_sends_what_quadrature_finds() {
@@ -232,7 +295,10 @@ mod tests {
                     (0..=STEPS).map(term).sum::<f64>()
                 };
                 let exact = sum(1.0) / sum(0.0);
-                let found = f64::from(share(middle as f32, growth as f32, optical_depth as f32));
+                let [in_middle, grows, depth] = [middle, growth, optical_depth].map(|v| pulp::Scalar.lanes(v as f32));
+                let mut found = [0.0; MAX_LANES];
+                share(pulp::Scalar, in_middle, grows, depth).store(&mut found);
+                let found = f64::from(found[0]);
                 assert!((found / exact - 1.0).abs() < 1e-5, "{optical_depth}, {growth}: {found} for {exact}");
             }
         }

@@ -7,13 +7,9 @@ use crate::scene::{self, Scene, SheetKernel, Technique};
 use sheet_light::{GatherKernel, KernelShape, Params, Reconstruction};
 use splat_core::{Accumulation, Camera};
 
-/// Share of voxels with extinction below which the plan has volumes splatted in slabs across the view: a splat is made of such a voxel alone, while a gathered slab looks for
-/// bricks that hold one. Both take as long at about a tenth of the voxels (a ball of 100³, 1.7 samples a voxel).
-const SPARSE: f64 = 0.25;
-
-/// Samples along a voxel above which the plan has volumes splatted in slabs across the view: rows of a kernel are then filled many samples at once. Gathering takes 0.4 times as long at 1.3
-/// to 2.7 samples, as long at 5, and 1.2 times as long at 11 (balls of 50³ and 100³ of which most voxels have extinction).
-const COARSE: f64 = 5.0;
+/// Share of voxels with extinction below which the plan has volumes splatted in slabs across the view: a splat is made of such a voxel alone, while all of a lattice
+/// is filtered before it is gathered. Where more shows, gathering takes as long or less (`scenes/head.toml`, 1 % to 60 % of its voxels, 1 to 22 samples along one).
+const SPARSE: f64 = 0.05;
 
 /// The form of a scene's slabs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +17,6 @@ pub(super) struct Chosen {
     pub(super) reconstruction: Reconstruction,
     /// Why, as `explain` says it.
     pub(super) reason: &'static str,
-    /// Share of the voxels that have extinction.
-    pub(super) visible: f64,
 }
 
 /// The form that a scene states, or the plan chooses for it. `camera` is that of samples.
@@ -35,8 +29,8 @@ pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen 
     let volumes = || natives.iter().filter(|native| native.technique == Technique::Sheets && native.grid().is_some());
     let voxels: f64 = volumes().filter_map(Own::grid).map(|grid| grid.values.len() as f64).sum();
     let visible = (volumes().map(|native| native.voxels() as f64).sum::<f64>() / voxels.max(1.0)).min(1.0);
-    let splat = |reason| Chosen { reconstruction: Reconstruction::Splat, reason, visible };
-    let gather = |reason| Chosen { reconstruction: Reconstruction::Gather(kernel), reason, visible };
+    let splat = |reason| Chosen { reconstruction: Reconstruction::Splat, reason };
+    let gather = |reason| Chosen { reconstruction: Reconstruction::Gather(kernel), reason };
     let states_kernel = KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma }
         != KernelShape::default()
         || settings.kernel_sections != Params::default().sections;
@@ -66,13 +60,11 @@ pub(super) fn chosen(scene: &Scene, natives: &[Own], camera: &Camera) -> Chosen 
         gather(
             "slabs lie across half vectors, where splatting would draw a voxel into each of its slabs anew, for the eye and for each light",
         )
-    } else if volumes().all(|native| samples_along_a_voxel(native) > COARSE) {
-        splat("voxels are wider than five samples, and a splat fills many of these at once")
     } else if visible < SPARSE {
-        splat("fewer than a quarter of the voxels have extinction, and these alone become splats")
+        splat("fewer than a twentieth of the voxels have extinction, and these alone become splats")
     } else {
         gather(
-            "a quarter of the voxels or more has extinction, and a pixel reads them in less time than all are splatted",
+            "a twentieth of the voxels or more has extinction, and pixels read them in less time than all are splatted",
         )
     }
 }

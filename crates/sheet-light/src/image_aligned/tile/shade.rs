@@ -9,7 +9,6 @@ use super::sheets::{Sheets, difference};
 use super::size::TILE;
 use crate::image_aligned::light::{Lamp, Lit, Reflector, Spots};
 use crate::image_aligned::prepared::Prepared;
-use crate::image_aligned::within::RayPart;
 use crate::shared::depths::{DepthRange, DepthSpans};
 use crate::shared::input::SheetInput;
 use crate::shared::pixel::Pixel;
@@ -385,18 +384,18 @@ impl Shader<'_> {
             let mut through = [simd.lanes(1.0); 3];
             if let Some(shadows) = &reconstructed.prepared.shadows {
                 let voxels = &reconstructed.prepared.voxels;
-                let cells = shadows.neighbours.cells(simd, voxels, &spots.places, lane_bits);
-                let within = reconstructed.prepared.within.as_ref();
-                let mut ray_parts = [RayPart::default(); MAX_LANES];
-                if within.is_some() {
-                    ray_parts = parts(shadows.neighbours.lattice_from_place, spots, medium);
+                let neighbours = &shadows.neighbours;
+                let cells = neighbours.cells(simd, voxels, &spots.places, lane_bits);
+                let mut thick_parts = None;
+                if let Some(within) = &reconstructed.prepared.within {
+                    let length = (medium.far - medium.near) * medium.secant;
+                    let Spots { places, to_eye, .. } = spots;
+                    thick_parts = Some(within.parts(simd, neighbours, places, to_eye, length, medium.depth));
                 }
                 for (rank, lamp) in self.lamps.iter().enumerate() {
                     through = shadows.transmittance(simd, voxels, &cells, rank);
-                    if let Some(within) = within {
-                        through = within_lanes(simd, through, |shares| {
-                            within.replace(&shadows.neighbours, voxels, &cells, rank, &ray_parts, shares);
-                        });
+                    if let Some(parts) = &thick_parts {
+                        through = parts.replace(simd, neighbours, voxels, &cells, rank, through);
                     }
                     reflector.add(simd, lamp, spots, &through, &mut lit);
                 }
@@ -472,45 +471,4 @@ fn mix<S: Simd>(simd: S, shaded: &Shaded<'_>, medium: &Medium<S>, fragments: &mu
     let is = medium.far.where_less_or(simd.lanes(0.0), tau_here, far);
     let both = far.max(is);
     is.where_less_or(first, half, both).store(&mut fragments.far);
-}
-
-/// The parts of the rays of some pixels in their slab, as thick volumes need them.
-#[inline(always)]
-fn parts<S: Simd>(lattice: [[f32; 4]; 3], spots: &Spots<S>, medium: &Medium<S>) -> [RayPart; MAX_LANES] {
-    let mut places = [[0.0; MAX_LANES]; 3];
-    let mut ways = [[0.0; MAX_LANES]; 3];
-    let mut lengths = [0.0; MAX_LANES];
-    let mut depths = [0.0; MAX_LANES];
-    for axis in 0..3 {
-        spots.places[axis].store(&mut places[axis]);
-        spots.to_eye[axis].store(&mut ways[axis]);
-    }
-    ((medium.far - medium.near) * medium.secant).store(&mut lengths);
-    medium.depth.store(&mut depths);
-    std::array::from_fn(|lane| {
-        let place = Vec3::new(places[0][lane], places[1][lane], places[2][lane]);
-        let way = Vec3::new(ways[0][lane], ways[1][lane], ways[2][lane]) * lengths[lane];
-        let row = |axis: usize| Vec3::new(lattice[axis][0], lattice[axis][1], lattice[axis][2]);
-        RayPart {
-            middle: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(place) + lattice[axis][3])),
-            to_eye: Vec3::from_array([0, 1, 2].map(|axis: usize| row(axis).dot(way))),
-            length: lengths[lane],
-            optical_depth: depths[lane],
-        }
-    })
-}
-
-/// Shares of some pixels, changed one by one.
-#[inline(always)]
-fn within_lanes<S: Simd>(
-    simd: S,
-    through: [Lanes<S>; 3],
-    change: impl FnOnce(&mut [[f32; MAX_LANES]; 3]),
-) -> [Lanes<S>; 3] {
-    let mut shares = [[0.0; MAX_LANES]; 3];
-    for channel in 0..3 {
-        through[channel].store(&mut shares[channel]);
-    }
-    change(&mut shares);
-    [Lanes::load(simd, &shares[0]), Lanes::load(simd, &shares[1]), Lanes::load(simd, &shares[2])]
 }
