@@ -141,6 +141,8 @@ fn what_gathered_slabs_have_not_is_refused_by_name() {
         ("reconstruction = 'gather', slicing = 'half_vector', kernel_extent = 2", "`kernel_extent`"),
         ("kernel = 'linear', kernel_extent = 3", "`kernel_extent`"),
         ("kernel = 'linear', reconstruction = 'splat'", "`kernel`"),
+        ("gradients = 'kernel', kernel_extent = 3", "`kernel_extent`"),
+        ("gradients = 'kernel', reconstruction = 'splat'", "`gradients`"),
         ("kernel = 'cubic'", "cubic"),
         ("reconstruction = 'both'", "both"),
     ] {

@@ -51,8 +51,8 @@ pub use render::layer_choice::{LAYER_NAMES, LayerChoice};
 pub use render::settings::{
     Aligned, Bending, Classify, Collisions, ComparedTechnique, Coverage, Goal, Grouping, OpaqueSurfels,
     ParticlesSettings, PointsSettings, Reconstruction, RenderSettings, Scattering, ShadowMapping, ShadowSettings,
-    SheetKernel, SheetsSettings, Slicing, SoftShadows, Stated, SurfaceSampler, SurfelGroups, SurfelLayers,
-    SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
+    SheetGradients, SheetKernel, SheetsSettings, Slicing, SoftShadows, Stated, SurfaceSampler, SurfelGroups,
+    SurfelLayers, SurfelsSettings, Technique, TechniqueKey, VolumeSampler,
 };
 pub use scene::model::Scene;
 pub use shown::{escape_controls, place, printable, short, shown};

@@ -5,7 +5,7 @@ use crate::half::common::{exact as exact_half, input as half_input, lit, sun};
 use crate::half::twin::differences as differences_half;
 use crate::twin::differences;
 use sheet_light::half::HalfParams;
-use sheet_light::{Error, Gradients, Params, SheetInput, prepare};
+use sheet_light::{Error, GatherKernel, Gradients, Params, Reconstruction, SheetInput, prepare};
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::shade::ChannelLayout;
 use splat_core::{Accumulator, Exceeded, LayerSet, Light, LightShape, Limits, Material};
@@ -17,11 +17,11 @@ fn smooth(p: DVec3) -> f64 {
 }
 
 /// Mean and largest angle, degrees, between the normals of a sphere that is seen and its radii.
-fn off_a_sphere(input: &SheetInput<'_>, radius: f64, gradients: Gradients) -> [f64; 2] {
+fn off_a_sphere(input: &SheetInput<'_>, radius: f64, params: &Params) -> [f64; 2] {
     let layout = ChannelLayout::new(&LayerSet { normal: true, ..LayerSet::default() });
     let camera = input.camera;
     let mut out = Accumulator::new(camera.size, 1, layout.count(), false, false);
-    let sheets = prepare(input.clone(), &Params { gradients, slab_width: Some(0.02), ..exact() }, None).unwrap();
+    let sheets = prepare(input.clone(), params, None).unwrap();
     sheets.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None).unwrap();
     let first = layout.normal().unwrap();
     let mut sum = 0.0;
@@ -58,7 +58,9 @@ fn normals_of_a_sphere_are_its_radii_by_sheets_and_better_by_a_gradient_volume()
         seen.normals = true;
         let volumes = [seen];
         let sphere = input(&volumes, &camera, &[]);
-        let [sheets, exact] = [Gradients::Sheets, VOLUME].map(|gradients| off_a_sphere(&sphere, radius, gradients));
+        let off_by =
+            |gradients| off_a_sphere(&sphere, radius, &Params { gradients, slab_width: Some(0.02), ..exact() });
+        let [sheets, exact] = [Gradients::Sheets, VOLUME].map(off_by);
         let packing = seen.packing;
         assert!(sheets[0] < 0.35 && sheets[1] < 1.1, "{packing:?}: {sheets:?}");
         assert!(exact[0] < 0.27 && exact[1] < 0.8 && exact[0] < 0.9 * sheets[0], "{packing:?}: {exact:?}, {sheets:?}");
@@ -82,6 +84,60 @@ fn gradient_volumes_are_those_of_the_twin() {
             assert!(tau < 2e-5 && color < 1e-4, "{:?}: {tau:e} {color:e}", seen.packing);
         }
     }
+}
+
+#[test]
+fn gradients_of_the_field_that_is_gathered_are_those_of_the_twin() {
+    let tf = transfer(&[(0.2, 0.0), (0.6, 0.8), (1.2, 0.1), (1.5, 3.0)]);
+    let material = Material { specular: 0.3, shininess: 12.0, ..Material::default() };
+    let lights = [sun([1.0, 2.0, 1.5]), lit(LightShape::Point { position: DVec3::new(4.0, 1.0, 5.0) })];
+    let sheared = DMat3::from_cols(DVec3::new(0.3, 0.05, 0.0), DVec3::new(0.1, 0.3, -0.05), DVec3::new(0.0, 0.1, -0.4));
+    let grid = grid([16, 14, 12], sheared, smooth);
+    let mut volumes = [volume(&grid, &tf, &material)];
+    volumes[0].normals = true;
+    for kernel in [GatherKernel::Gaussian, GatherKernel::Linear] {
+        let params = Params { gradients: Gradients::Kernel, reconstruction: Reconstruction::Gather(kernel), ..exact() };
+        for camera in [parallel([3.0, 2.0, 8.0], 6.0, [48, 40]), perspective([2.0, 3.0, 8.0], 40.0, [40, 48])] {
+            let [tau, color] = differences(&input(&volumes, &camera, &lights), &params);
+            assert!(tau < 2e-5 && color < 1e-4, "{kernel:?}: {tau:e} {color:e}");
+        }
+    }
+}
+
+#[test]
+fn gradients_of_the_field_know_nothing_of_slabs() {
+    let radius = 1.6;
+    let material = Material::default();
+    let tf = transfer(&[(-1.61, 0.0), (-1.59, 500.0)]);
+    let cartesian = grid([24, 24, 24], cubic(0.2), |p: DVec3| -p.length());
+    let mut volumes = [volume(&cartesian, &tf, &material)];
+    volumes[0].normals = true;
+    for (size, slab_width) in [(64, None), (64, Some(0.02)), (24, Some(0.02))] {
+        let camera = parallel([3.0, 2.0, 8.0], 4.0, [size, size]);
+        for kernel in [GatherKernel::Gaussian, GatherKernel::Linear] {
+            let params = Params {
+                gradients: Gradients::Kernel,
+                reconstruction: Reconstruction::Gather(kernel),
+                slab_width,
+                ..exact()
+            };
+            let [mean, most] = off_a_sphere(&input(&volumes, &camera, &[]), radius, &params);
+            println!("{size}, {slab_width:?}, {kernel:?}: {mean}, {most}");
+            assert!(mean < 0.27 && most < 1.0, "{size}, {slab_width:?}, {kernel:?}: {mean}, {most}");
+        }
+    }
+}
+
+#[test]
+fn splatted_sheets_have_no_field_to_differentiate() {
+    let tf = transfer(&[(0.0, 1.0)]);
+    let material = Material::default();
+    let grid = grid([4, 4, 4], cubic(0.2), smooth);
+    let camera = parallel([3.0, 2.0, 8.0], 6.0, [8, 8]);
+    let volumes = [volume(&grid, &tf, &material)];
+    let params = Params { gradients: Gradients::Kernel, reconstruction: Reconstruction::Splat, ..exact() };
+    let refused = prepare(input(&volumes, &camera, &[]), &params, None);
+    assert!(matches!(refused.err(), Some(Error::Parameter { name: "gradients", .. })));
 }
 
 #[test]

@@ -4,8 +4,8 @@ use super::Request;
 use super::knob::points::spacing_factor;
 use super::knob::tables;
 use organza::scene::{
-    Classify, Collisions, Coverage, Grouping, Reconstruction, RenderSettings, Scene, ShadowMapping, SheetKernel,
-    Slicing, SoftShadows, SurfaceSampler, SurfelLayers, VolumeSampler,
+    Classify, Collisions, Coverage, Grouping, Reconstruction, RenderSettings, Scene, ShadowMapping, SheetGradients,
+    SheetKernel, Slicing, SoftShadows, SurfaceSampler, SurfelLayers, VolumeSampler,
 };
 use splat_core::Packing;
 use splat_core::raster::Accumulation;
@@ -193,7 +193,12 @@ fn sheets(render: &RenderSettings, settings: &mut Vec<Stated>) {
     add("kernel_sigma", number(sheets.kernel_sigma));
     add("kernel_sections", sheets.kernel_sections.to_string());
     add("accumulation", precision(sheets.accumulation));
-    add("gradients", quoted(if sheets.gradient_volume { "volume" } else { "sheets" }));
+    let gradients = match sheets.gradients {
+        SheetGradients::Sheets => "sheets",
+        SheetGradients::Volume => "volume",
+        SheetGradients::Kernel => "kernel",
+    };
+    add("gradients", quoted(gradients));
     add("transmittance_cutoff", number(sheets.transmittance_cutoff));
     let Slicing::HalfVector { light_pixels, scattering, soft_shadows, .. } = sheets.slicing else {
         add("classify", quoted(if sheets.classify == Classify::Before { "before" } else { "after" }));

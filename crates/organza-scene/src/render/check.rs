@@ -12,8 +12,8 @@ use crate::text::de::suggest;
 use crate::text::tree::Value;
 use crate::{
     Aligned, Classify, Error, Goal, LAYER_NAMES, LayerChoice, ParticlesSettings, PointsSettings, Reconstruction,
-    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetKernel, SheetsSettings, Slicing, SoftShadows,
-    Stated, SurfaceSampler, Technique, TechniqueKey, VolumeSampler, shown,
+    RenderSettings, Scattering, ShadowMapping, ShadowSettings, SheetGradients, SheetKernel, SheetsSettings, Slicing,
+    SoftShadows, Stated, SurfaceSampler, Technique, TechniqueKey, VolumeSampler, shown,
 };
 use splat_core::{Accumulation, Direction};
 
@@ -235,7 +235,11 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         kernel_sigma: sigma,
         kernel_sections: check_sections(at, raw.kernel_sections.unwrap_or(256))?,
         accumulation: check_accumulation(raw.accumulation),
-        gradient_volume: raw.gradients == RawGradients::Volume,
+        gradients: match raw.gradients {
+            RawGradients::Sheets => SheetGradients::Sheets,
+            RawGradients::Volume => SheetGradients::Volume,
+            RawGradients::Kernel => SheetGradients::Kernel,
+        },
         transmittance_cutoff: check_cutoff(at, raw.transmittance_cutoff)?,
     })
 }
@@ -250,25 +254,36 @@ fn check_reconstruction(at: &At<'_>, raw: &RawSheets) -> Result<Reconstruction, 
         ("aligned", raw.aligned == Some(RawAligned::Axis), "they lie along the view"),
         ("accumulation", raw.accumulation == RawAccumulation::F16, "they sum nothing over voxels"),
     ];
-    let is_linear = raw.kernel == Some(RawKernel::Linear);
-    match raw.reconstruction {
-        RawReconstruction::Splat => match raw.kernel {
-            Some(_) => {
-                let message = "`kernel`: slabs are splatted, whose kernel `kernel_extent` and `kernel_sigma` state";
-                Err(at.key("kernel").error(message, "set reconstruction = \"gather\", or leave it out"))
-            }
-            None => Ok(Reconstruction::Splat),
-        },
-        RawReconstruction::Auto if !is_linear => Ok(Reconstruction::Auto),
-        RawReconstruction::Auto | RawReconstruction::Gather => {
-            match splatted.into_iter().find(|(_, is_given, _)| *is_given) {
-                None => Ok(Reconstruction::Gather),
-                Some((key, _, reason)) => {
-                    let asked = if is_linear { "kernel = \"linear\"" } else { "reconstruction = \"gather\"" };
-                    let message = format!("`{key}`: {asked} has slabs gathered, and {reason}");
-                    Err(at.key(key).error(message, "set reconstruction = \"splat\", or leave it out"))
-                }
-            }
+    // What gathered slabs alone have asks for them.
+    let asked = if raw.kernel == Some(RawKernel::Linear) {
+        Some("kernel = \"linear\"")
+    } else if raw.gradients == RawGradients::Kernel {
+        Some("gradients = \"kernel\"")
+    } else {
+        (raw.reconstruction == RawReconstruction::Gather).then_some("reconstruction = \"gather\"")
+    };
+    if raw.reconstruction == RawReconstruction::Splat {
+        let refused =
+            |key, message| Err(at.key(key).error(message, "set reconstruction = \"gather\", or leave it out"));
+        if raw.kernel.is_some() {
+            return refused(
+                "kernel",
+                "`kernel`: slabs are splatted, whose kernel `kernel_extent` and `kernel_sigma` state",
+            );
+        }
+        if raw.gradients == RawGradients::Kernel {
+            return refused("gradients", "`gradients`: slabs are splatted, and read no field that has a derivative");
+        }
+        return Ok(Reconstruction::Splat);
+    }
+    let Some(asked) = asked else {
+        return Ok(Reconstruction::Auto);
+    };
+    match splatted.into_iter().find(|(_, is_given, _)| *is_given) {
+        None => Ok(Reconstruction::Gather),
+        Some((key, _, reason)) => {
+            let message = format!("`{key}`: {asked} has slabs gathered, and {reason}");
+            Err(at.key(key).error(message, "set reconstruction = \"splat\", or leave it out"))
         }
     }
 }

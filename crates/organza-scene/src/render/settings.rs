@@ -193,8 +193,8 @@ pub struct SheetsSettings {
     pub kernel_sections: u32,
     /// Precision of the sums of voxels in a slab and of slabs in a pixel; that of half precision takes at most 2048 slabs.
     pub accumulation: Accumulation,
-    /// Whether normals come from central differences at voxels, interpolated, in the place of those of neighbouring pixels and slabs.
-    pub gradient_volume: bool,
+    /// Where normals come from.
+    pub gradients: SheetGradients,
     /// A pixel is finished when its transmittance falls below this, in [0, 1).
     pub transmittance_cutoff: f64,
 }
@@ -419,6 +419,17 @@ pub enum Reconstruction {
     Gather,
     /// Each voxel writes into slabs.
     Splat,
+}
+
+/// Where the normals of volumes come from that reflect about their gradients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SheetGradients {
+    /// Differences of neighbouring pixels and slabs.
+    Sheets,
+    /// Central differences at voxels, interpolated.
+    Volume,
+    /// The derivative of the field that gathered slabs read.
+    Kernel,
 }
 
 /// The kernel of gathered slabs.

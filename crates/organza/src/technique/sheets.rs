@@ -17,7 +17,7 @@ use crate::load::Loaded;
 use crate::load::own::{Body, Own};
 use crate::pass;
 use crate::plan::{Effect, Plan, PlannedSetting};
-use crate::scene::{self, LightPoint, Scene, Technique};
+use crate::scene::{self, LightPoint, Scene, SheetGradients, Technique};
 use crate::statistics::{MediumFacts, ObjectData, ObjectStatistics, SourceFacts};
 use crate::technique::{Asked, Fold, OwnWork, Session, points};
 use crate::{CostRecord, Error, RenderOptions, memory, stage};
@@ -486,7 +486,11 @@ fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,
         accumulation: settings.accumulation,
-        gradients: if settings.gradient_volume { Gradients::Volume } else { Gradients::Sheets },
+        gradients: match settings.gradients {
+            SheetGradients::Sheets => Gradients::Sheets,
+            SheetGradients::Volume => Gradients::Volume,
+            SheetGradients::Kernel => Gradients::Kernel,
+        },
         lighting: Lighting::Joint,
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),

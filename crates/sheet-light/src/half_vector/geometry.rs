@@ -10,6 +10,7 @@ use crate::half_vector::slicing::gathered::GatheredVolume;
 use crate::half_vector::slicing::placed::Placed;
 use crate::half_vector::slicing::sight::{Shape, Sight};
 use crate::shared::depths::DepthRange;
+use crate::shared::gathered::gradient::KernelGradients;
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::params::Reconstruction;
 use crate::shared::pixel::Pixel;
@@ -27,6 +28,8 @@ pub(crate) struct VolumeVoxels<'a> {
     pub(crate) shadows: Option<Shadows<'a>>,
     /// Central-difference gradients, where normals come from a gradient volume.
     pub(crate) gradients: Option<GradientVolume>,
+    /// Where normals come from the field that sheets read.
+    pub(crate) kernel_gradients: Option<KernelGradients>,
 }
 
 /// What sheets get the values of a volume from.
@@ -90,7 +93,10 @@ impl<'a> Geometry<'a> {
                 let receivers = placed.receivers(&voxels, lattice.rim);
                 let shadows = Shadows::new(&receivers, lights, shadow_origin);
                 let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
-                self.voxels.push(VolumeVoxels { voxels, values: Values::Gathered(volume), shadows, gradients });
+                let differentiates = self.params.differentiates(placed.volume);
+                let kernel_gradients = differentiates.then(|| KernelGradients::new(&placed.lattice_rows()));
+                let values = Values::Gathered(volume);
+                self.voxels.push(VolumeVoxels { voxels, values, shadows, gradients, kernel_gradients });
                 continue;
             }
             let shape = &self.shapes[v];
@@ -109,7 +115,8 @@ impl<'a> Geometry<'a> {
                 buffer.push(lists);
             }
             let gradients = GradientVolume::new(&receivers, &lattice, &self.params);
-            self.voxels.push(VolumeVoxels { voxels, values: Values::Splatted(buckets), shadows, gradients });
+            let values = Values::Splatted(buckets);
+            self.voxels.push(VolumeVoxels { voxels, values, shadows, gradients, kernel_gradients: None });
         }
     }
 

@@ -16,6 +16,7 @@ use crate::image_aligned::tile::ring::Ring;
 use crate::image_aligned::tile::sheets::Sheets;
 use crate::image_aligned::tile::size::{AREA, TILE, tiles};
 use crate::shared::error::cancelled;
+use crate::shared::gathered::gradient::KernelGradients;
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::input::{SheetInput, Splats};
 use crate::shared::lattice::Lattice;
@@ -55,6 +56,9 @@ pub fn prepare<'a>(input: SheetInput<'a>, params: &Params, progress: Option<&Pro
         }
         needed += GradientVolume::bytes(count, volume, params);
         check(needed, params)?;
+        if params.differentiates(volume) {
+            prepared.kernel_gradients = Some(KernelGradients::new(&prepared.rays.rows()));
+        }
         prepared.gradients = GradientVolume::new(&prepared.receivers(), &prepared.lattice, params);
         prepared.shadows = Shadows::new(&prepared.receivers(), &input.lights, input.shadow_origin);
         if params.lighting == Lighting::Joint {

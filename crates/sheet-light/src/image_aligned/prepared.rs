@@ -9,6 +9,7 @@ use super::viewed::{PixelFootprint, Viewed, lacking};
 use super::within::Within;
 use crate::image_aligned::tile::ring::{Splatter, Taper};
 use crate::shared::classifier::{Base, Classifier};
+use crate::shared::gathered::gradient::KernelGradients;
 use crate::shared::gathered::{Gathered, RIM};
 use crate::shared::gradient_volume::GradientVolume;
 use crate::shared::input::SheetInput;
@@ -50,8 +51,12 @@ pub(crate) struct Prepared<'a> {
     pub(crate) gathered: Option<Gathered<'a>>,
     /// Of one whose spacing is optically thick.
     pub(crate) within: Option<Within<'a>>,
+    /// Whether normals come from neighbouring sheets.
+    pub(crate) compares: bool,
     /// Where normals come from that.
     pub(crate) gradients: Option<GradientVolume>,
+    /// Where they come from the field that sheets read.
+    pub(crate) kernel_gradients: Option<KernelGradients>,
     /// Its slabs that lack kernels, because these lie behind the eye.
     pub(crate) lacking: Option<Range<u32>>,
     pub(crate) segments: Segments,
@@ -137,7 +142,9 @@ impl<'a> Prepared<'a> {
             shadows: None,
             gathered,
             within: None,
+            compares,
             gradients: None,
+            kernel_gradients: None,
             lacking: slabs_beside_eye,
             segments,
             base,

@@ -47,6 +47,8 @@ struct Sheets {
     classes: Vec<[f64; 4]>,
     /// Where each ray is inside.
     crossings: Vec<[f64; 2]>,
+    /// What is gathered.
+    lattice: Option<Exact>,
     size: [usize; 2],
 }
 
@@ -114,10 +116,13 @@ impl Sheets {
             depths: vec![0.0; n],
             classes: vec![[0.0; 4]; if params.classify == Classify::Before { n } else { 0 }],
             crossings: pixels.map(|pixel| crossing(ray(pixel))).collect(),
+            lattice: None,
             size,
         };
         if let Reconstruction::Gather(kernel) = params.reconstruction {
-            sheets.gather(&Exact::new(volume, kernel), &rays, ray);
+            let lattice = Exact::new(volume, kernel);
+            sheets.gather(&lattice, &rays, ray);
+            sheets.lattice = Some(lattice);
             return sheets;
         }
         let viewed = Viewed::new(volume, camera, slabs, params, slant);
@@ -274,6 +279,7 @@ impl Sheets {
             _ if !volume.normals => Vec3::ZERO,
             Gradients::Sheets => self.normal(view, own_slab, pixel, along),
             Gradients::Volume => normal_of_volume(volume, position),
+            Gradients::Kernel => self.lattice.as_ref().map_or(Vec3::ZERO, |l| normal_of_field(volume, l, position)),
         };
         let point = Point {
             position,
@@ -329,6 +335,13 @@ fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [
     });
     let effects = radiance.effects();
     [0, 1, 2].map(|c| effects.iter().map(|effect| f64::from(effect[c])).sum())
+}
+
+/// −∇v/|∇v| of the field that gathered sheets read, at a world position.
+pub(crate) fn normal_of_field(volume: &Volume<'_>, lattice: &Exact, world: DVec3) -> Vec3 {
+    let inverse = volume.axes().inverse();
+    let gradient = lattice.gradient(inverse * (world - volume.origin()));
+    -(inverse.transpose() * gradient).normalize_or_zero().as_vec3()
 }
 
 /// −∇v/|∇v| of a gradient volume at a world position: central differences at the lattice points around it, linear along each axis.

@@ -8,6 +8,7 @@ pub(crate) mod bricks;
 #[cfg(feature = "reference")]
 pub(crate) mod exact;
 mod filter;
+pub(crate) mod gradient;
 
 use crate::Volume;
 use crate::shared::classifier::Base;
@@ -17,6 +18,7 @@ use crate::shared::params::GatherKernel;
 use crate::shared::vectors::NATURAL;
 use crate::shared::voxels::{Voxels, without_extinction};
 use bricks::{Box3, Bricks};
+use splat_core::glam::IVec3;
 use splat_core::raster::lanes::{Broadcast, Lanes, MAX_LANES};
 use splat_core::raster::pulp::Simd;
 use splat_core::{Grid, Packing, TransferFunction};
@@ -122,6 +124,12 @@ impl<'a> Gathered<'a> {
         }
         let start = (cell[2] as usize * self.stored[1] + cell[1] as usize) * self.stored[0] + cell[0] as usize;
         Corner { before: self.before as f64, cell, start, last }
+    }
+
+    /// What any place is counted from: the first cell.
+    #[inline(always)]
+    fn first_corner(&self) -> Corner {
+        self.corner(&Box3 { low: IVec3::MIN, high: IVec3::MAX })
     }
 
     /// Values at places that are counted from a corner, relative to the volume's base.

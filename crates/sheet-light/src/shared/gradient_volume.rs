@@ -42,10 +42,7 @@ impl GradientVolume {
             let mut gradients = (0..ny * nz).into_par_iter().map(row).collect::<Vec<_>>().concat();
             // Voxels are read by two, and one that is missing has the rank of the next.
             gradients.extend([[0.0; 3]; 2]);
-            let rows = receivers.rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
-            let longest = rows.iter().map(|row| row.length()).fold(0.0, f64::max);
-            let directions = rows.map(|row| (row / longest).as_vec3().to_array());
-            Self { gradients, neighbours: Neighbours::new(receivers), directions }
+            Self { gradients, neighbours: Neighbours::new(receivers), directions: directions(&receivers.rows) }
         })
     }
 
@@ -78,6 +75,13 @@ impl GradientVolume {
         }
         out
     }
+}
+
+/// What a gradient of 1 a step along each axis of a lattice is in the space of places, from which `rows` lead to it, the longest of length 1.
+pub(crate) fn directions(rows: &[[f64; 4]; 3]) -> [[f32; 3]; 3] {
+    let rows = rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
+    let longest = rows.iter().map(|row| row.length()).fold(0.0, f64::max);
+    rows.map(|row| (row / longest).as_vec3().to_array())
 }
 
 fn is_wanted(volume: &Volume<'_>, params: &Params) -> bool {

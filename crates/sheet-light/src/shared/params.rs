@@ -71,6 +71,9 @@ pub enum Gradients {
     /// A gradient volume: central differences at the voxels, interpolated trilinearly; 12 bytes a voxel that is needed. So ray casters have it, and
     /// normals know nothing of kernels, slabs and pixels.
     Volume,
+    /// The field that gathered sheets read: by the derivative of its kernel; of a linear one, whose derivative jumps from cell to cell, by differences from one step
+    /// before to one behind. What is splatted has none.
+    Kernel,
 }
 
 /// Where the part of a ray in a slab takes the light that comes through shadows.
@@ -134,6 +137,11 @@ impl Params {
         Ok(())
     }
 
+    /// Whether the gradients of a volume are those of the field that its sheets read.
+    pub(crate) fn differentiates(&self, volume: &Volume<'_>) -> bool {
+        volume.normals && self.gradients == Gradients::Kernel
+    }
+
     /// Whether the gradients of a volume are told from neighbouring sheets.
     pub(crate) fn compares_sheets(&self, volume: &Volume<'_>) -> bool {
         volume.normals && self.gradients == Gradients::Sheets
@@ -171,6 +179,8 @@ impl Params {
         }
         if self.reconstruction != Reconstruction::Splat {
             self.check_gathered()?;
+        } else if self.gradients == Gradients::Kernel {
+            return Err(Error::parameter("gradients", self.gradients, "Sheets or Volume where voxels are splatted"));
         }
         if !(0.0..1.0).contains(&self.transmittance_cutoff) {
             return Err(Error::parameter("transmittance_cutoff", self.transmittance_cutoff, "0 to below 1"));

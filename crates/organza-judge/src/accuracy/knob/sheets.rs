@@ -3,8 +3,8 @@
 use super::points::{absorbance_cut, cells, choice, cutoffs, finer, samples, step};
 use crate::accuracy::{Facts, Knob, Options, Request, Skipped, Sweep, Theory};
 use organza::scene::{
-    Aligned, Classify, LayerChoice, Reconstruction, Scattering, Scene, SceneObject, SheetKernel, SheetsSettings,
-    Slicing, SoftShadows, Source, Technique,
+    Aligned, Classify, LayerChoice, Reconstruction, Scattering, Scene, SceneObject, SheetGradients, SheetKernel,
+    SheetsSettings, Slicing, SoftShadows, Source, Technique,
 };
 use splat_core::raster::Accumulation;
 use splat_core::{Packing, Shading};
@@ -324,7 +324,10 @@ fn gradients(scene: &Scene) -> Result<Knob, String> {
     if scene.lights.is_empty() || !scene.objects.iter().any(reflects) {
         return Err("no volume reflects about its gradient".into());
     }
-    let set = |request: &mut Request, value| request.scene.render.sheets.gradient_volume = value > 0.0;
+    let set = |request: &mut Request, value| {
+        request.scene.render.sheets.gradients =
+            if value > 0.0 { SheetGradients::Volume } else { SheetGradients::Sheets };
+    };
     Ok(choices("gradients", set, &[("of neighbouring sheets", 0.0), ("a gradient volume", 1.0)]))
 }
 

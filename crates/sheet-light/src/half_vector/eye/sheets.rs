@@ -459,9 +459,13 @@ impl OneSlab<'_> {
         is_wanted: &[f32; MAX_LANES],
     ) -> [Vec3; MAX_LANES] {
         let geometry = self.work.geometry;
-        let VolumeVoxels { voxels, gradients, .. } = &geometry.voxels[v];
+        let VolumeVoxels { voxels, values, gradients, kernel_gradients, .. } = &geometry.voxels[v];
         if let Some(gradients) = gradients {
             return geometry.gradients.world(&stored(&gradients.gradients(simd, voxels, places, bits(is_wanted))));
+        }
+        if let (Values::Gathered(volume), Some(gradients)) = (values, kernel_gradients) {
+            let gradients = gradients.gradients(simd, &volume.lattice, places, bits(is_wanted));
+            return geometry.gradients.world(&stored(&gradients));
         }
         if !geometry.volumes[v].normals {
             return [Vec3::ZERO; MAX_LANES];

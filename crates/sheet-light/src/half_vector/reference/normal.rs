@@ -1,7 +1,7 @@
 //! Normals: solved for from the samples of neighbouring pixels and sheets, or those of a gradient volume.
 
 use super::{Image, SlabVoxels, View};
-use crate::image_aligned::reference::normal_of_volume;
+use crate::image_aligned::reference::{normal_of_field, normal_of_volume};
 use crate::shared::params::Gradients;
 use splat_core::glam::{DMat3, DVec3, DVec4, Vec3};
 
@@ -20,8 +20,10 @@ impl View<'_> {
         if !volume.normals {
             return Vec3::ZERO;
         }
-        if self.params.sheets.gradients == Gradients::Volume {
-            return normal_of_volume(volume, self.frame.world(middle));
+        match self.params.sheets.gradients {
+            Gradients::Sheets => {}
+            Gradients::Volume => return normal_of_volume(volume, self.frame.world(middle)),
+            Gradients::Kernel => return normal_of_field(volume, &self.gathered[v], self.frame.world(middle)),
         }
         let [width, height] = eye.camera.size.map(|s| s as usize);
         // a, b, s and value of a neighbour that is inside.

@@ -17,7 +17,7 @@ use splat_core::raster::pulp::Simd;
 
 /// A volume whose sheets are gathered.
 pub(crate) struct GatheredVolume<'a> {
-    lattice: Gathered<'a>,
+    pub(crate) lattice: Gathered<'a>,
     /// Lattice from slab coordinates.
     rows: [[f32; 4]; 3],
 }

@@ -259,12 +259,15 @@ impl Shader<'_> {
             [u * towards, v * towards, towards]
         };
         let places = self.slopes.places(simd, Pixel { x: place.x, y: place.y }, middle);
-        let (normal, is_normal) = match &reconstructed.prepared.gradients {
-            Some(gradients) => {
-                unit(simd, &gradients.gradients(simd, &reconstructed.prepared.voxels, &places, lane_bits))
-            }
-            None if reconstructed.prepared.volume.normals => unit(simd, &self.gradient(simd, reconstructed, place)),
-            None => ([zero; 3], zero),
+        let prepared = reconstructed.prepared;
+        let (normal, is_normal) = if let Some(gradients) = &prepared.gradients {
+            unit(simd, &gradients.gradients(simd, &prepared.voxels, &places, lane_bits))
+        } else if let (Some(gradients), Some(lattice)) = (&prepared.kernel_gradients, &prepared.gathered) {
+            unit(simd, &gradients.gradients(simd, lattice, &places, lane_bits))
+        } else if prepared.volume.normals {
+            unit(simd, &self.gradient(simd, reconstructed, place))
+        } else {
+            ([zero; 3], zero)
         };
         Spots { places, to_eye, normal, is_normal, color: medium.color }
     }

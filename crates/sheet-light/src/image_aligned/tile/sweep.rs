@@ -55,7 +55,7 @@ impl VolumeScratch {
     ) {
         let batch = self.batches.start;
         self.batches.start += 1;
-        let mask = picture.mask(prepared.volume.normals && prepared.gradients.is_none());
+        let mask = picture.mask(prepared.compares);
         if let Some(gathered) = &prepared.gathered {
             let lines = SheetLines { rays: &prepared.rays, slopes, slabs: &prepared.slabs, crossings: &self.crossings };
             counts.fragments += lines.batch(simd, gathered, batch, &mask, &mut self.sheets);

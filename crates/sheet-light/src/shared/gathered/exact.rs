@@ -26,8 +26,27 @@ impl Exact {
 
     /// The value at a place in lattice coordinates.
     pub(crate) fn at(&self, place: DVec3) -> f64 {
+        let (cell, weights) = self.kernel.cell(self.dims, place, None);
+        self.sum(cell, &weights)
+    }
+
+    /// The derivatives there along the axes of the lattice, per step, as [`Gradients::Kernel`](crate::Gradients::Kernel) has them.
+    pub(crate) fn gradient(&self, place: DVec3) -> DVec3 {
+        let along = |axis: usize| match self.kernel {
+            GatherKernel::Linear => {
+                let step = DVec3::AXES[axis];
+                0.5 * (self.at(place + step) - self.at(place - step))
+            }
+            GatherKernel::Gaussian => {
+                let (cell, weights) = self.kernel.cell(self.dims, place, Some(axis));
+                self.sum(cell, &weights)
+            }
+        };
+        DVec3::new(along(0), along(1), along(2))
+    }
+
+    fn sum(&self, cell: [usize; 3], weights: &[[f64; 4]; 3]) -> f64 {
         let lattice = Lattice::over(&[], self.dims, Packing::Cartesian, RIM);
-        let (cell, weights) = self.kernel.cell(self.dims, place);
         let before = self.kernel.reach()[0];
         let [nx, ny, _] = self.dims;
         let mut sum = 0.0;
@@ -52,9 +71,9 @@ impl Exact {
 }
 
 impl GatherKernel {
-    /// The first voxel of the cell of a place, counted with the rim, and the shares of its neighbours along each axis. Far outside those of the
-    /// nearest place that the lattice goes on to.
-    fn cell(self, dims: [usize; 3], place: DVec3) -> ([usize; 3], [[f64; 4]; 3]) {
+    /// The first voxel of the cell of a place, counted with the rim, and the shares of its neighbours along each axis, along one of them their derivatives. Far
+    /// outside those of the nearest place that the lattice goes on to.
+    fn cell(self, dims: [usize; 3], place: DVec3, derived: Option<usize>) -> ([usize; 3], [[f64; 4]; 3]) {
         let mut cell = [0usize; 3];
         let mut weights = [[0.0f64; 4]; 3];
         for a in 0..3 {
@@ -62,7 +81,7 @@ impl GatherKernel {
             let inside = place[a].clamp(-1.0, last);
             let low = inside.floor().min(last - 1.0);
             cell[a] = (low + RIM[a] as f64) as usize;
-            weights[a] = self.weights(inside - low);
+            weights[a] = if derived == Some(a) { spline_slopes(inside - low) } else { self.weights(inside - low) };
         }
         (cell, weights)
     }
@@ -83,6 +102,12 @@ impl GatherKernel {
             }
         }
     }
+}
+
+/// Derivatives of the shares of a cubic B-spline.
+fn spline_slopes(t: f64) -> [f64; 4] {
+    let u = 1.0 - t;
+    [-0.5 * u * u, 1.5 * t * t - 2.0 * t, 2.0 * u - 1.5 * u * u, 0.5 * t * t]
 }
 
 /// The filtered values of a lattice.
