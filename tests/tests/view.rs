@@ -186,6 +186,29 @@ fn a_scene_that_changes_is_seen_as_it_is_now() {
 }
 
 #[test]
+fn a_data_file_that_breaks_has_the_name_that_it_was_given() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let data = elsewhere.path().canonicalize().unwrap().join("corner.xyz");
+    std::fs::write(&data, "0 0 0\n1 0 0\n0 1 0\n0 0 1\n").unwrap();
+    let place = Place::new(SMALL_SCENE);
+    let given = data.to_str().unwrap();
+    let view = View::start(&place, &[given, "--watch"]);
+    view.saved("picture.png");
+    std::fs::write(&data, "0 0 0\n1 0 zero\n").unwrap();
+    let end = Instant::now() + Duration::from_secs(30);
+    let failure = loop {
+        let state: serde_json::Value = serde_json::from_slice(&view.get("state?client=a&after=0").1).unwrap();
+        if let Some(message) = state["failure"]["message"].as_str() {
+            break message.to_owned();
+        }
+        assert!(Instant::now() < end, "{state}");
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert!(failure.starts_with(&format!("{given}:2:")), "{failure}");
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
 fn data_files_are_seen_as_render_draws_them() {
     let place = Place::new(SMALL_SCENE);
     place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
@@ -216,7 +239,11 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
     place.write("events.json", "[{\"do\": \"opacity\", \"object\": \"fog\", \"opacity\": 0.5}]");
     place.write("fly.json", "[{\"do\": \"fly\"}]");
     for (code, arguments, said) in [
-        (3, &["s.toml", "--play", "events.json"][..], "opacity"),
+        (
+            3,
+            &["s.toml", "--play", "events.json"][..],
+            "error: events.json:1: event 1 (`opacity`): opacity of object fog: ",
+        ),
         (3, &["s.toml", "--play", "fly.json"], "fly.json: unknown variant"),
         (4, &["s.toml", "--play", "none.json"], "cannot read the events"),
         (4, &["s.toml", "--record", "fly.json"], "fly.json"),
@@ -241,7 +268,11 @@ fn a_recording_of_another_scene_is_played_as_far_as_it_fits() {
     let (_, state) = view.get("state?client=a");
     assert!(String::from_utf8(state).unwrap().contains("\"exposure\":1.5"));
     let (code, told) = view.interrupted();
-    assert!(code == Some(0) && told.contains("event 0") && told.contains("found `renamed`"), "{told}");
+    assert!(
+        code == Some(0)
+            && told.contains("events.json:1: event 1 (`light_shadow`): expected the name of a light, found `renamed`"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -98,8 +98,8 @@ struct Papers {
     depths: Option<Arc<Depths>>,
     /// How often values of volumes occur, by the names of the objects.
     curves: BTreeMap<String, Values>,
-    /// A box around all that was drawn, world units.
-    bounds: Option<DAabb>,
+    /// Boxes around what was drawn of objects, world units, by the objects' names.
+    boxes: BTreeMap<String, DAabb>,
     /// Names of columns that objects can be coloured by, by the objects' names.
     columns: BTreeMap<String, Vec<String>>,
     /// What objects are made of, by their names.
@@ -136,8 +136,8 @@ pub(crate) struct Seen {
     pub(crate) effects: Option<Vec<EffectRow>>,
     /// How often values of volumes occur, by the names of the objects.
     pub(crate) curves: BTreeMap<String, Values>,
-    /// A box around all that was drawn, world units.
-    pub(crate) bounds: Option<DAabb>,
+    /// Boxes around what was drawn of objects, world units, by the objects' names.
+    pub(crate) boxes: BTreeMap<String, DAabb>,
     /// Names of columns that objects can be coloured by, by the objects' names.
     pub(crate) columns: BTreeMap<String, Vec<String>>,
     /// Settings from fast to exact; `None` before a page asks for them.
@@ -158,7 +158,7 @@ impl Desk {
             whole: None,
             depths: None,
             curves: BTreeMap::new(),
-            bounds: None,
+            boxes: BTreeMap::new(),
             columns: BTreeMap::new(),
             data: BTreeMap::new(),
             rungs: None,
@@ -213,7 +213,7 @@ impl Desk {
             whole: papers.whole.as_ref().map(|whole| whole.generation),
             effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
             curves: papers.curves.clone(),
-            bounds: papers.bounds,
+            boxes: papers.boxes.clone(),
             columns: papers.columns.clone(),
             rungs: papers.rungs.clone(),
             is_predicting: papers.is_predicting,
@@ -310,12 +310,13 @@ impl Desk {
         }
     }
 
-    /// Keeps a box around what was drawn, beside what was drawn before: a cut leaves less, and may go back.
-    pub(crate) fn keep_bounds(&self, bounds: DAabb) {
+    /// Keeps a box around what was drawn of an object, beside what was drawn before: a cut leaves less, and may go back.
+    pub(crate) fn keep_box(&self, object: &str, bounds: DAabb) {
         let mut papers = self.papers();
-        let whole = papers.bounds.map_or(bounds, |before| before.union(bounds));
-        if papers.bounds != Some(whole) {
-            papers.bounds = Some(whole);
+        let known = papers.boxes.get(object).copied();
+        let whole = known.map_or(bounds, |before| before.union(bounds));
+        if known != Some(whole) {
+            papers.boxes.insert(object.to_owned(), whole);
             self.tell(papers);
         }
     }
@@ -356,7 +357,7 @@ impl Desk {
     /// Forgets what is known of data.
     pub(crate) fn forget_values(&self) {
         let mut papers = self.papers();
-        papers.bounds = None;
+        papers.boxes.clear();
         papers.columns.clear();
         papers.curves.clear();
         papers.data.clear();

@@ -16,6 +16,8 @@ use std::path::PathBuf;
 pub struct Opening {
     /// The title of the page: the names of the opened files.
     pub title: String,
+    /// Data files by the names that the person gave them: a scene that is made of them names them from its folder.
+    pub inputs: Vec<PathBuf>,
     /// The scene's file, which gives the format and the folder that paths are relative to; it need not be there.
     pub file: PathBuf,
     /// Its text.
@@ -35,7 +37,7 @@ impl Opening {
         let load = LoadOptions { memory, in_memory: InMemory::default(), ..LoadOptions::default() };
         let file = file.into();
         let title = printable(file.file_name().unwrap_or(file.as_os_str()).as_ref());
-        Self { title, file, text: text.into(), load, options, files: Files::default() }
+        Self { title, inputs: Vec::new(), file, text: text.into(), load, options, files: Files::default() }
     }
 }
 

@@ -113,6 +113,8 @@ fn the_page_and_its_parts_are_served_under_one_policy() {
         ("", "text/html"),
         ("page.js", script),
         ("curve.js", script),
+        ("cut.js", script),
+        ("overlay.js", script),
         ("judge.js", script),
         ("save.js", script),
         ("page.css", "text/css"),
@@ -196,6 +198,10 @@ fn a_picture_is_kept_compared_and_let_go() {
     for path in ["kept", "difference"] {
         assert!(running.get(&format!("{path}?client=a")).head.contains("image/png"), "{path}");
     }
+    // The second state of the view, compared with the picture that was kept.
+    let kept = running.session.shown().kept.unwrap().number;
+    let difference = running.get("difference?client=a").head;
+    assert!(difference.contains(&format!("organza-pair: {kept}/2\r\n")), "{difference}");
     assert_eq!(post("let-go").status, 200);
     assert_eq!(running.get("difference?client=a").status, 204);
     let accuracy = post("accuracy");

@@ -86,7 +86,9 @@ at("accuracy-reset").addEventListener("click", () => add({ do: "accuracy", step:
 
 const keptCanvas = at("kept");
 let kept = null;
+/// The kept picture and the state that were compared last, and those that the difference on the page belongs to.
 let compared = "";
+let differing = "";
 let comparing = false;
 
 async function keep() {
@@ -106,11 +108,14 @@ function showCompare(found) {
     if (kept !== null) showOver("kept");
   }
   if (!found.kept) return;
-  const key = `${kept}/${found.generation}`;
+  const key = pairOf(found.generation);
   if (key !== compared) at("compare-text").textContent = `${keptText(found.kept)}. Compared once the present picture is whole.`;
   if (found.is_whole && key !== compared && !comparing) compare(found.kept, key);
   placeDivider();
 }
+
+/// The kept picture and a state, in a word.
+const pairOf = (state) => `${kept}/${state}`;
 
 function keptText(row) {
   const position = row.step === 0 ? "" : `, ${POSITIONS[row.step]}`;
@@ -132,14 +137,14 @@ async function compare(row, key) {
       at("difference").disabled = !isCompared;
       at("gain").textContent = isCompared ? `shown ${found.gain} times as large` : "";
       if (!isCompared) at("difference").checked = false;
-      if (at("difference").checked || keptCanvas.dataset.what === "difference") showOver(at("difference").checked ? "difference" : "kept");
+      if (at("difference").checked || keptCanvas.dataset.what === "difference") await showOver(at("difference").checked ? "difference" : "kept");
     }
   } catch {
     lost();
   }
   comparing = false;
   // The scene may have changed meanwhile.
-  if (shown && shown.kept && shown.is_whole && `${kept}/${shown.generation}` !== key) showCompare(shown);
+  if (shown && shown.kept && shown.is_whole && pairOf(shown.generation) !== key) showCompare(shown);
 }
 
 /// Shows the kept picture, or the difference, over the present one.
@@ -152,6 +157,7 @@ async function showOver(what) {
     keptCanvas.height = image.height;
     keptCanvas.getContext("2d").drawImage(image, 0, 0);
     keptCanvas.dataset.what = what;
+    differing = answer.headers.get("organza-pair");
     image.close();
     placeDivider();
   } catch {
@@ -163,6 +169,10 @@ async function showOver(what) {
 function placeDivider() {
   if (kept === null) return;
   const isDifference = keptCanvas.dataset.what === "difference";
+  // The picture may have changed since.
+  const isOfPair = !isDifference || (differing === pairOf(generation) && at("coarse").hidden);
+  keptCanvas.hidden = !isOfPair;
+  at("difference-text").hidden = isOfPair;
   const width = shown ? (pictureHeight() * shown.size.width) / shown.size.height : stage.clientWidth;
   const left = (stage.clientWidth - width) / 2 + width * (1 - Number(at("divide").value) / 100);
   at("divider").hidden = isDifference;
@@ -246,7 +256,7 @@ async function lookOnce(place, isSaid) {
 function belowText(below) {
   const words = [];
   if (below.object !== null) words.push(below.object);
-  if (below.position) words.push(`at ${below.position.map(rounded).join(", ")}`, `depth ${short(below.depth)}`);
+  if (below.position) words.push(`at ${below.position.map((number) => rounded(number)).join(", ")}`, `depth ${short(below.depth)}`);
   else words.push("nothing that hides what lies behind it");
   for (const { name, value, meaning } of below.values) words.push(`${name} ${short(value)}${meaning ? ` ${meaning}` : ""}`);
   if (below.numbers.length > 0) {

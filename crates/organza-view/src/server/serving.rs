@@ -45,6 +45,7 @@ const SCRIPT: &str = include_str!("../page/page.js");
 const CURVE: &str = include_str!("../page/curve.js");
 const CUT: &str = include_str!("../page/cut.js");
 const JUDGE: &str = include_str!("../page/judge.js");
+const OVERLAY: &str = include_str!("../page/overlay.js");
 const SAVE: &str = include_str!("../page/save.js");
 const STYLE: &str = include_str!("../page/page.css");
 
@@ -140,6 +141,7 @@ impl<'p> Route<'p> {
             "curve.js" => Self::Script(CURVE),
             "cut.js" => Self::Script(CUT),
             "judge.js" => Self::Script(JUDGE),
+            "overlay.js" => Self::Script(OVERLAY),
             "save.js" => Self::Script(SAVE),
             "page.css" => Self::Style,
             "state" => Self::State,
@@ -221,9 +223,8 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
             found.map_or_else(|| Ok(nothing()), |found| Ok(of_type("application/json", json_of(&*found)?)))
         }
         Route::Difference => {
-            let found = comparison(&counter.session).await?;
-            let png = found.map(|found| found.png.clone()).filter(|png| !png.is_empty());
-            Ok(png.map_or_else(nothing, |png| of_type("image/png", png)))
+            let found = comparison(&counter.session).await?.filter(|found| !found.png.is_empty());
+            found.map_or_else(|| Ok(nothing()), |found| difference(&found))
         }
         Route::Save(what) => saved(&counter.session, what).await,
         Route::Page | Route::Script(_) | Route::Style | Route::Leave => {
@@ -358,6 +359,15 @@ async fn comparison(session: &Arc<Session>) -> Result<Option<Arc<Comparison>>, R
     let found = tokio::task::spawn_blocking(move || session.comparison()).await;
     let found = found.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "comparing two pictures failed"))?;
     found.map_err(|e| Refusal::of_error(&e))
+}
+
+/// A difference, which names the kept picture and the state that it is of.
+fn difference(found: &Comparison) -> Result<Answer, Refusal> {
+    let mut answer = of_type("image/png", found.png.clone());
+    let pair = HeaderValue::from_str(&format!("{}/{}", found.kept, found.generation));
+    let pair = pair.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "two numbers are no header"))?;
+    answer.headers_mut().insert(HeaderName::from_static("organza-pair"), pair);
+    Ok(answer)
 }
 
 fn json_of(document: &impl Serialize) -> Result<Vec<u8>, Refusal> {
