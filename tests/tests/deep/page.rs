@@ -174,6 +174,40 @@ fn a_difference_is_shown_beside_the_picture_that_it_belongs_to() {
 }
 
 #[test]
+fn two_pictures_are_shown_side_by_side() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.value("at('compare-panel').open = true, at('keep').click()");
+    page.wait_for("shown.kept && !at('divider').hidden");
+    page.value("at('beside').click()");
+    let side = "((canvas) => { const box = canvas.getBoundingClientRect(); return [box.left / stage.clientWidth, box.width / stage.clientWidth]; })";
+    let half = |page: &mut Page, id: &str| -> Vec<f64> {
+        serde_json::from_value(page.value(&format!("{side}(at('{id}'))"))).unwrap()
+    };
+    assert_eq!((half(&mut page, "picture"), half(&mut page, "kept")), (vec![0.0, 0.5], vec![0.5, 0.5]));
+    assert_eq!(
+        page.value("at('divider').hidden && at('divide').disabled && keptCanvas.style.clipPath === 'none'"),
+        true
+    );
+    // What the view turns around is in the middle of the left half, for the pointer, the cursor and planes.
+    let middle = page.value("onStage(shown.viewpoint.centre)[0] / stage.clientWidth").as_f64().unwrap();
+    assert!((middle - 0.25).abs() < 1e-6, "{middle}");
+    assert_eq!(page.value("pictureBelow({ x: 0.25 * stage.clientWidth, y: 0.5 * stage.clientHeight }).right"), 0.5);
+    assert_eq!(
+        page.value("pictureBelow({ x: 0.75 * stage.clientWidth, y: 0.5 * stage.clientHeight })"),
+        serde_json::Value::Null
+    );
+    page.press("v");
+    assert_eq!(page.value("parseFloat(at('crosshair').style.left) / stage.clientWidth"), 0.25);
+    page.press("v");
+    page.value("at('let-go').click()");
+    page.wait_for("!shown.kept && !stage.classList.contains('beside')");
+    assert_eq!(half(&mut page, "picture"), [0.0, 1.0]);
+    ends_well(&page, view);
+}
+
+#[test]
 fn a_knot_is_moved_by_keys_and_pictures_are_compared() {
     let place = Place::new(SMALL_SCENE);
     let scene = volume(&place);

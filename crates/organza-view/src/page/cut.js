@@ -191,8 +191,9 @@ function onStage(place) {
   const from = place.map((number, k) => number - eye.centre[k]);
   const depth = eye.distance - dot(from, towardsEye());
   if (!eye.is_parallel && depth <= 1e-3 * eye.distance) return null;
-  const scale = ((eye.is_parallel ? 1 : eye.distance / depth) * pictureHeight()) / eye.height;
-  return [stage.clientWidth / 2 + scale * dot(from, eye.right), stage.clientHeight / 2 - scale * dot(from, eye.up)];
+  const box = pictureBox();
+  const scale = ((eye.is_parallel ? 1 : eye.distance / depth) * box.height) / eye.height;
+  return [box.left + box.width / 2 + scale * dot(from, eye.right), box.top + box.height / 2 - scale * dot(from, eye.up)];
 }
 
 /// The corners of a plane in the box of what it cuts, around its middle.

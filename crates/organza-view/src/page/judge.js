@@ -97,6 +97,12 @@ async function keep() {
 }
 
 function showCompare(found) {
+  keepUp(found);
+  arrange();
+}
+
+/// Follows the kept picture, and compares it with a new one.
+function keepUp(found) {
   at("keep").disabled = !found.is_whole;
   at("let-go").hidden = at("compare").hidden = !found.kept;
   const number = found.kept ? found.kept.number : null;
@@ -173,17 +179,36 @@ function placeDivider() {
   const isOfPair = !isDifference || (differing === pairOf(generation) && at("coarse").hidden);
   keptCanvas.hidden = !isOfPair;
   at("difference-text").hidden = isOfPair;
-  const width = shown ? (pictureHeight() * shown.size.width) / shown.size.height : stage.clientWidth;
-  const left = (stage.clientWidth - width) / 2 + width * (1 - Number(at("divide").value) / 100);
-  at("divider").hidden = isDifference;
-  at("divider").style.left = `${left}px`;
-  keptCanvas.style.clipPath = isDifference ? "none" : `inset(0 0 0 ${left}px)`;
+  const { left, width } = pictureBox();
+  const place = left + width * (1 - Number(at("divide").value) / 100);
+  const isDivided = !isDifference && !isBeside();
+  at("divider").hidden = !isDivided;
+  at("divide").disabled = !isDivided;
+  at("divider").style.left = `${place}px`;
+  keptCanvas.style.clipPath = isDivided ? `inset(0 0 0 ${place}px)` : "none";
+  at("beside-kept").textContent = isDifference ? "difference" : "kept";
 }
+
+/// Whether the present picture has the left half of the stage, and the kept one or the difference the right half.
+const isBeside = () => kept !== null && at("beside").checked;
+
+/// Places what lies on the stage anew where the picture has moved on it.
+function arrange() {
+  if (stage.classList.toggle("beside", isBeside()) === wasBeside) return;
+  wasBeside = isBeside();
+  if (shown) show(shown, true);
+  if (cursor) placeCursor();
+}
+let wasBeside = false;
 
 at("keep").addEventListener("click", keep);
 at("let-go").addEventListener("click", () => ask("let-go"));
 at("divide").addEventListener("input", placeDivider);
 at("difference").addEventListener("change", () => showOver(at("difference").checked ? "difference" : "kept"));
+at("beside").addEventListener("change", () => {
+  arrange();
+  placeDivider();
+});
 window.addEventListener("resize", placeDivider);
 at("divider").addEventListener("pointerdown", (event) => {
   at("divider").setPointerCapture(event.pointerId);
@@ -193,8 +218,8 @@ at("divider").addEventListener("pointermove", (event) => {
   if (!(event.buttons & 1)) return;
   event.stopPropagation();
   const box = stage.getBoundingClientRect();
-  const width = shown ? (pictureHeight() * shown.size.width) / shown.size.height : box.width;
-  const share = 0.5 + (event.clientX - box.left - box.width / 2) / width;
+  const { left, width } = pictureBox();
+  const share = (event.clientX - box.left - left) / width;
   at("divide").value = Math.round(100 * (1 - Math.min(1, Math.max(0, share))));
   placeDivider();
 });
@@ -291,10 +316,9 @@ function toggleCursor() {
 }
 
 function placeCursor() {
-  const height = pictureHeight();
-  const width = shown ? (height * shown.size.width) / shown.size.height : stage.clientWidth;
-  at("crosshair").style.left = `${stage.clientWidth / 2 + (cursor.right - 0.5) * width}px`;
-  at("crosshair").style.top = `${stage.clientHeight / 2 + (cursor.down - 0.5) * height}px`;
+  const box = pictureBox();
+  at("crosshair").style.left = `${box.left + cursor.right * box.width}px`;
+  at("crosshair").style.top = `${box.top + cursor.down * box.height}px`;
   lookBelow(cursor, true);
 }
 

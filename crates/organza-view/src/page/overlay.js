@@ -81,8 +81,8 @@ function roundLength(length) {
 
 function showScale(found) {
   const eye = found.viewpoint;
-  const pixels = pictureHeight() / eye.height;
-  const width = (pictureHeight() * found.size.width) / found.size.height;
+  const { width, height } = pictureBox();
+  const pixels = height / eye.height;
   const length = roundLength(Math.min(LONGEST_BAR, LONGEST_BAR_SHARE * width) / pixels);
   at("scale").hidden = !at("scale-shown").checked || !(length > 0 && Number.isFinite(length));
   at("scale-bar").style.width = `${length * pixels}px`;

@@ -555,11 +555,17 @@ function makeEffect(effect) {
 
 // ---- the pointer ----
 
-/// Height of the picture in the stage, CSS pixels: shares of it are what events are in.
-function pictureHeight() {
+/// Where the present picture is on the stage, CSS pixels: as large as there is room, in the left half beside the kept one.
+function pictureBox() {
   const aspect = shown ? shown.size.width / shown.size.height : 16 / 9;
-  return Math.min(stage.clientHeight, stage.clientWidth / aspect) || 1;
+  const room = isBeside() ? stage.clientWidth / 2 : stage.clientWidth;
+  const height = Math.min(stage.clientHeight, room / aspect) || 1;
+  const width = height * aspect;
+  return { left: (room - width) / 2, top: (stage.clientHeight - height) / 2, width, height };
 }
+
+/// Shares of it are what events are in.
+const pictureHeight = () => pictureBox().height;
 
 const pointers = new Map();
 let span = null;
@@ -603,12 +609,11 @@ let pointer = null;
 stage.addEventListener("pointermove", (event) => (pointer = { x: event.clientX, y: event.clientY }));
 stage.addEventListener("pointerleave", () => (pointer = null));
 function pictureBelow(place) {
-  const box = stage.getBoundingClientRect();
-  const height = pictureHeight();
-  const width = shown ? (height * shown.size.width) / shown.size.height : box.width;
   if (!place) return { right: 0.5, down: 0.5 };
-  const right = 0.5 + (place.x - box.left - box.width / 2) / width;
-  const down = 0.5 + (place.y - box.top - box.height / 2) / height;
+  const corner = stage.getBoundingClientRect();
+  const box = pictureBox();
+  const right = (place.x - corner.left - box.left) / box.width;
+  const down = (place.y - corner.top - box.top) / box.height;
   const isInside = right >= 0 && right <= 1 && down >= 0 && down <= 1;
   return isInside ? { right, down } : null;
 }
