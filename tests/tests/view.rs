@@ -19,7 +19,8 @@ pub(crate) struct View {
 impl View {
     pub(crate) fn start(place: &Place, arguments: &[&str]) -> Self {
         let mut command = organza();
-        command.current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
+        // What it leaves there is seen by the test.
+        command.env("TMPDIR", place.folder()).current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
@@ -205,6 +206,46 @@ fn a_data_file_that_breaks_has_the_name_that_it_was_given() {
         std::thread::sleep(Duration::from_millis(50));
     };
     assert!(failure.starts_with(&format!("{given}:2:")), "{failure}");
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
+fn a_file_that_a_page_hands_over_is_opened_within_the_limits_of_the_command() {
+    let place = Place::new(SMALL_SCENE);
+    let points = "x,y,z\n0,0,0\n1,0,0\n0,1,0\n0,0,1\n";
+    place.write("corner.csv", points);
+    let before = place.made();
+    let hand_over = |view: &View, name: &str, body: &str| {
+        let headers = format!("Content-Type: application/octet-stream\r\nContent-Length: {}\r\n", body.len());
+        let (status, answer) = view.ask(&format!("POST /{}/open?client=a&name={name}", view.token), &headers, body);
+        (status, String::from_utf8(answer).unwrap())
+    };
+    let view = View::start(&place, &["s.toml", "--size", "40x30", "--max-memory", "300000000"]);
+    let (status, refused) = hand_over(&view, "other.toml", SMALL_SCENE);
+    assert!(status == 422 && refused.contains("other.toml: expected a data file, found a scene"), "{refused}");
+    let (status, refused) = hand_over(&view, "other.docx", "what is this");
+    assert!(status == 422 && refused.contains("other.docx"), "{refused}");
+    let headers = "Content-Type: application/octet-stream\r\nContent-Length: 300000001\r\n";
+    let line = format!("POST /{}/open?client=a&name=large.csv", view.token);
+    let (status, refused) = view.ask(&line, headers, "");
+    assert!(status == 413 && String::from_utf8_lossy(&refused).contains("--max-memory"), "{status}");
+    let (status, opened) = hand_over(&view, "corner.csv", points);
+    assert!(status == 200 && opened.contains("\"title\":\"corner.csv\""), "{opened}");
+    let picture = view.saved("picture.png");
+    let scene = view.saved("scene");
+    let (code, told) = view.interrupted();
+    assert_eq!(code, Some(0), "{told}");
+    assert_eq!(place.made(), before, "nothing is left");
+    place.write("view.png", picture);
+    place.expect(0, &["render", "corner.csv", "--size", "40x30", "-o", "render.png"], "");
+    assert_eq!(place.pixels("view.png"), place.pixels("render.png"));
+    place.write("saved.toml", scene);
+    place.expect(0, &["render", "saved.toml", "-o", "saved.png"], "");
+    assert_eq!(place.pixels("saved.png"), place.pixels("render.png"));
+    // A recording is of one scene.
+    let view = View::start(&place, &["s.toml", "--record", "events.json"]);
+    let (status, refused) = hand_over(&view, "corner.csv", points);
+    assert!(status == 409 && refused.contains("--record"), "{refused}");
     assert_eq!(view.interrupted().0, Some(0));
 }
 

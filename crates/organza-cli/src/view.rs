@@ -1,17 +1,21 @@
 //! `organza view`.
 
-use super::args::ViewArguments;
+use super::args::{FirstArguments, ViewArguments};
 use super::console::bar::with_bar;
 use super::console::{self, signals};
-use super::given::given;
+use super::given::{given, is_scene, wish, write_first};
 use super::session::{overrides, parse_scene, processor_only, render_options, unused_goal, without_effect};
 use organza::output::{Target, Targets};
 use organza::scene::LoadOptions;
-use organza::{Error, InMemory, Progress, printable};
-use organza_view::{Ended, EventFile, MOST_EVENTS, Opened, Opening, Recording, Server, Session, Watch};
+use organza::{Error, Files, InMemory, Progress, RenderOptions, printable};
+use organza_survey::Wish;
+use organza_view::{
+    Ended, EventFile, GivenFile, MOST_EVENTS, Opened, Opener, Opening, Recording, Server, Session, Watch,
+};
 use serde_json::json;
 use splat_core::MemoryAccount;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -21,7 +25,10 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     arguments.record.as_ref().map(|path| Target::new(path, arguments.force)).transpose()?;
     let played = arguments.play.as_ref().map(|path| EventFile::read(path)).transpose()?.unwrap_or_default();
     let address = arguments.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
-    let server = Server::bind(address)?;
+    let options = render_options(&arguments.scene);
+    let first = wish(&FirstArguments::default(), arguments.scene.common.size, None)?;
+    let opener = Opener::new(options.max_memory, move |file| open_handed_over(file, &first, &options));
+    let server = Server::bind(address)?.opening(opener);
     let Opened { session, left_out } = with_bar(|progress| open(arguments, &played, progress))?;
     left_out_events(&left_out).iter().for_each(|sentence| console::warn(sentence));
     // Whoever reads the address may interrupt at once.
@@ -92,9 +99,34 @@ fn open(arguments: &ViewArguments, played: &EventFile, progress: &Progress) -> R
     let names =
         scene_arguments.inputs.iter().map(|path| printable(path.file_name().unwrap_or(path.as_os_str()).as_ref()));
     let title = names.collect::<Vec<_>>().join(", ");
-    let inputs = scene_arguments.inputs.clone();
-    let opening = Opening { title, inputs, file: given.file, text: given.bytes, load, options, files };
+    let input = |path: &PathBuf| GivenFile { path: path.clone(), name: printable(path) };
+    let inputs = scene_arguments.inputs.iter().map(input).collect();
+    let is_fleeting = false;
+    let opening = Opening { title, inputs, is_fleeting, file: given.file, text: given.bytes, load, options, files };
     Session::open_playing(opening, played, progress)
+}
+
+/// Opens a data file that a page hands over, in a first scene of this size without other wishes: those on the command line are for other data.
+fn open_handed_over(given: GivenFile, wish: &Wish, options: &RenderOptions) -> Result<Session, Error> {
+    if is_scene(&given.path) {
+        let hint = "it names other files, which a page does not hand over: start `organza view` with it";
+        return Err(Error::input(given.name, "expected a data file, found a scene", hint));
+    }
+    let files = Files::default();
+    let file = given.path.with_extension("toml");
+    let written = write_first(std::slice::from_ref(&given.path), &file, wish, &files, options)?;
+    let load = LoadOptions { sandbox: true, memory: MemoryAccount::new(options.max_memory), ..LoadOptions::default() };
+    let opening = Opening {
+        title: given.name.clone(),
+        inputs: vec![given],
+        is_fleeting: true,
+        file,
+        text: written.text.into_bytes(),
+        load,
+        options: options.clone(),
+        files,
+    };
+    Session::open(opening, &Progress::new())
 }
 
 /// Prints where the page is, and opens it.

@@ -80,6 +80,12 @@ impl Artist {
                     self.answer(desk, &request);
                     continue;
                 }
+                Job::Forget => {
+                    self.forget();
+                    desk.forget_values();
+                    desk.rests();
+                    continue;
+                }
             };
             if request.edition != self.edition {
                 self.forget();

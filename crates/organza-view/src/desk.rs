@@ -82,6 +82,8 @@ pub(crate) enum Job {
     Draw(Arc<Request>),
     /// Say of the request whose whole picture is there how exact it is.
     Measure(Arc<Request>),
+    /// Let everything go that was read and made.
+    Forget,
 }
 
 /// What lies on the desk.
@@ -113,6 +115,9 @@ struct Papers {
     failure: Option<Failure>,
     /// The viewpoint of the camera that the scene states.
     scene_viewpoint: Viewpoint,
+    /// Whether nothing is to be drawn, and whether what was read and made is forgotten since.
+    is_resting: bool,
+    is_forgotten: bool,
     is_closed: bool,
 }
 
@@ -166,6 +171,8 @@ impl Desk {
             is_asked: false,
             failure: None,
             scene_viewpoint,
+            is_resting: false,
+            is_forgotten: false,
             is_closed: false,
         };
         Self { papers: Mutex::new(papers), changed: Condvar::new(), versions: watch::Sender::new(0) }
@@ -245,6 +252,37 @@ impl Desk {
         self.tell(papers);
     }
 
+    /// Has the artist forget what it read and made, and draw nothing until [`Desk::wake`]; false where that takes too long.
+    pub(crate) fn rest(&self, patience: Duration) -> bool {
+        let end = Instant::now() + patience;
+        let mut papers = self.papers();
+        papers.is_resting = true;
+        papers.is_forgotten = false;
+        papers.at_work.iter().for_each(|at_work| at_work.progress.cancel());
+        self.changed.notify_all();
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            if papers.is_forgotten || papers.is_closed || left.is_zero() {
+                return papers.is_forgotten;
+            }
+            papers = self.changed.wait_timeout(papers, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Everything is forgotten that was read and made.
+    pub(crate) fn rests(&self) {
+        let mut papers = self.papers();
+        papers.is_forgotten = true;
+        self.tell(papers);
+    }
+
+    /// Has the artist draw again.
+    pub(crate) fn wake(&self) {
+        let mut papers = self.papers();
+        papers.is_resting = false;
+        self.tell(papers);
+    }
+
     /// Ends all work.
     pub(crate) fn close(&self) {
         let mut papers = self.papers();
@@ -259,6 +297,13 @@ impl Desk {
         loop {
             if papers.is_closed {
                 return None;
+            }
+            if papers.is_resting {
+                if !papers.is_forgotten {
+                    return Some(Job::Forget);
+                }
+                papers = self.changed.wait(papers).unwrap_or_else(PoisonError::into_inner);
+                continue;
             }
             let newest = papers.newest.clone().filter(|request| request.generation > papers.taken);
             if let Some(request) = newest {
@@ -282,7 +327,7 @@ impl Desk {
         let mut papers = self.papers();
         let progress = Arc::new(Progress::new());
         let is_old = papers.newest.as_ref().is_some_and(|newest| newest.generation > generation);
-        if papers.is_closed || (task != Task::Coarse && is_old) {
+        if papers.is_closed || papers.is_resting || (task != Task::Coarse && is_old) {
             progress.cancel();
         }
         papers.at_work = Some(AtWork { task, progress: Arc::clone(&progress) });

@@ -61,9 +61,9 @@ pub use lights::{Direction, LightRow};
 pub use picture::{EffectRow, Facts, Legend, Level, Mark, PassRow, Picture, Size};
 pub use recording::{MOST_EVENTS, Recording};
 pub use replay::EventFile;
-pub use server::{Ended, Framing, Server};
+pub use server::{Ended, Framing, Opener, Server};
 pub use session::{Failure, ObjectRow, Opened, Session, Shown, ShownAccuracy, ShownBox};
-pub use state::Opening;
+pub use state::{GivenFile, Opening};
 pub use viewpoint::Viewpoint;
 pub use watch::Watch;
 

@@ -24,6 +24,7 @@ use serde::Serialize;
 use splat_core::glam::DVec3;
 use splat_core::{DAabb, Projection};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -35,8 +36,16 @@ const FAREWELL: Duration = Duration::from_millis(600);
 /// How long whoever asks for the place below the pointer waits for a coarse picture of it.
 const LOOK_BELOW: Duration = Duration::from_secs(10);
 
+/// How long a session that is to rest waits for its artist: passes hear of it at their next step.
+const REST: Duration = Duration::from_secs(10);
+
+/// Sessions that were begun in this process.
+static SESSIONS: AtomicU64 = AtomicU64::new(0);
+
 /// A scene that is viewed: its state, and the thread that draws it.
 pub struct Session {
+    /// Another one for each session of the process.
+    number: u64,
     desk: Arc<Desk>,
     studio: Mutex<Studio>,
     /// The picture that was kept.
@@ -64,6 +73,7 @@ pub struct Opened {
 struct Studio {
     title: String,
     names: GivenNames,
+    is_fleeting: bool,
     source: Source,
     /// The scene as the command line has it.
     stated: Scene,
@@ -83,6 +93,8 @@ struct Studio {
 /// The state that a page shows beside the picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shown {
+    /// The session: it is another one after a page has opened a file.
+    pub session: u64,
     /// Grows with every change.
     pub version: u64,
     /// The state; a session's states are counted from 1.
@@ -248,7 +260,7 @@ impl Session {
     /// # Errors
     /// As [`Session::open`]. [`Error::Input`] that names the place of an event for a scene that is refused with it, and for a column that its file lacks.
     pub fn open_playing(opening: Opening, played: &EventFile, progress: &Progress) -> Result<Opened, Error> {
-        let Opening { title, inputs, file, text, load, options, files } = opening;
+        let Opening { title, inputs, is_fleeting, file, text, load, options, files } = opening;
         let is_on_disk = file.is_file();
         let source = Source { file, text, load };
         let mut stated = source.scene(source.load.overrides.clone())?;
@@ -268,6 +280,7 @@ impl Session {
         let mut studio = Studio {
             title,
             names,
+            is_fleeting,
             source,
             stated,
             uncut,
@@ -279,8 +292,9 @@ impl Session {
             recording: None,
         };
         studio.take(state, &desk)?;
+        let number = SESSIONS.fetch_add(1, Ordering::Relaxed);
         let session =
-            Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
+            Self { number, desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
         Ok(Opened { session, left_out })
     }
 
@@ -383,6 +397,22 @@ impl Session {
         self.desk.ask_for_rungs();
     }
 
+    /// Lets everything go that was read and made, and draws nothing until [`Session::wake`]; false where that takes too long.
+    pub(crate) fn rest(&self) -> bool {
+        self.desk.rest(REST)
+    }
+
+    /// Draws again, with files that are read anew.
+    pub(crate) fn wake(&self) {
+        self.desk.wake();
+        self.reload();
+    }
+
+    /// Whether its events are recorded.
+    pub(crate) fn is_recording(&self) -> bool {
+        self.studio().recording.is_some()
+    }
+
     /// Records events from now on.
     pub fn record(&self, recording: Recording) {
         self.studio().recording = Some(recording);
@@ -446,6 +476,7 @@ impl Session {
         let facts = picture.as_ref().map(|picture| &picture.facts);
         let effects = effects.as_deref().or(facts.map(|facts| facts.effects.as_slice())).unwrap_or_default();
         Shown {
+            session: self.number,
             version,
             generation: studio.generation,
             title: studio.title.clone(),
@@ -516,6 +547,9 @@ impl Session {
         let differs = || Error::Internal("the text of this scene is not read as the scene that is seen".into());
         if read != *scene {
             return Err(differs());
+        }
+        if studio.is_fleeting {
+            return Ok(text);
         }
         let data: Vec<PathBuf> = scene.files().into_iter().filter(|file| *file != source.file).collect();
         let text = scene_text::anywhere(source, &text, &data)?;

@@ -1,9 +1,9 @@
 //! Errors in the words of the page, because its users type no command line.
 
 use crate::picture::Facts;
+use crate::state::GivenFile;
 use organza::scene::Scene;
 use organza::{Error, printable};
-use std::path::PathBuf;
 
 /// What is found wrong, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -78,12 +78,12 @@ struct GivenName {
 
 impl GivenNames {
     /// Of the files that a scene reads those that were given by another name.
-    pub(crate) fn new(scene: &Scene, inputs: &[PathBuf]) -> Self {
+    pub(crate) fn new(scene: &Scene, inputs: &[GivenFile]) -> Self {
         let files = scene.files();
-        let name = |given: &PathBuf| {
-            let real = given.canonicalize().ok()?;
+        let name = |given: &GivenFile| {
+            let real = given.path.canonicalize().ok()?;
             let in_scene = files.iter().find(|file| file.canonicalize().is_ok_and(|file| file == real))?;
-            Some(GivenName { in_scene: printable(in_scene), given: printable(given) })
+            Some(GivenName { in_scene: printable(in_scene), given: given.name.clone() })
         };
         let mut names: Vec<_> = inputs.iter().filter_map(name).filter(|name| name.in_scene != name.given).collect();
         // A long name may end with a short one.

@@ -411,3 +411,26 @@ fn axes_and_a_scale_bar_are_over_the_picture_and_the_axes_are_looked_along() {
     assert_eq!(page.value(saved), bytes);
     ends_well(&page, view);
 }
+
+#[test]
+fn a_file_that_is_dropped_is_opened_and_what_is_none_is_refused() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let drop = |name: &str, text: &str| {
+        format!(
+            "(() => {{ const dataTransfer = new DataTransfer(); dataTransfer.items.add(new File(['{text}'], '{name}')); \
+             for (const kind of ['dragover', 'drop']) stage.dispatchEvent(new DragEvent(kind, {{ dataTransfer, bubbles: true, cancelable: true }})); }})()"
+        )
+    };
+    page.value(&drop("corner.csv", "x,y,z\\n0,0,zero\\n"));
+    page.wait_for("at('trouble').textContent.startsWith('corner.csv:2:') && at('opening').hidden");
+    page.wait_for(WHOLE);
+    // The browser itself reports the refusal of a request.
+    page.faults.clear();
+    page.value(&drop("corner.csv", "x,y,z\\n0,0,0\\n1,0,0\\n0,1,0\\n"));
+    page.wait_for("shown.title === 'corner.csv' && at('title').textContent === 'corner.csv'");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value("shown.objects.map((object) => object.name)"), serde_json::json!(["corner"]));
+    ends_well(&page, view);
+}

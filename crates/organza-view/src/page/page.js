@@ -139,6 +139,12 @@ function showMark(found) {
 // ---- what the page shows ----
 
 function show(found, isAgain = false) {
+  if (shown && found.session !== shown.session) {
+    // Another scene is open: nothing of this one holds.
+    isOpen = false;
+    location.replace(location.pathname);
+    return;
+  }
   if (shown && found.version < shown.version && !isAgain) return;
   shown = found;
   document.title = `${found.title} · Organza`;
@@ -162,6 +168,7 @@ function show(found, isAgain = false) {
   for (const side of ["width", "height"]) {
     if (!isHeld(at(side))) at(side).value = found.size[side];
   }
+  at("open").hidden = found.most_file_bytes === null;
   stage.style.setProperty("--aspect", `${found.size.width} / ${found.size.height}`);
   for (const id of ["save-png", "save-exr"]) at(id).disabled = !found.is_whole;
 }
