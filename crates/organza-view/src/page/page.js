@@ -519,8 +519,8 @@ function showEffects(effects) {
 
 function costText(effect) {
   if (effect.predicted_ms === null && effect.measured_ms === null) return "";
-  const share = effect.sharing > 1 ? `, shared evenly by ${effect.sharing}` : "";
-  const measured = effect.measured_ms === null ? "kept" : `${milliseconds(effect.measured_ms)} ms${share}`;
+  const share = effect.sharing > 1 ? "even share: " : "";
+  const measured = effect.measured_ms === null ? "kept" : `${share}${milliseconds(effect.measured_ms)} ms`;
   return effect.predicted_ms === null ? measured : `${measured} (${milliseconds(effect.predicted_ms)})`;
 }
 
