@@ -19,7 +19,8 @@ pub(crate) struct View {
 impl View {
     pub(crate) fn start(place: &Place, arguments: &[&str]) -> Self {
         let mut command = organza();
-        command.current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
+        // What it leaves there is seen by the test.
+        command.env("TMPDIR", place.folder()).current_dir(place.folder()).arg("view").args(arguments).arg("--no-open");
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
@@ -186,6 +187,69 @@ fn a_scene_that_changes_is_seen_as_it_is_now() {
 }
 
 #[test]
+fn a_data_file_that_breaks_has_the_name_that_it_was_given() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let data = elsewhere.path().canonicalize().unwrap().join("corner.xyz");
+    std::fs::write(&data, "0 0 0\n1 0 0\n0 1 0\n0 0 1\n").unwrap();
+    let place = Place::new(SMALL_SCENE);
+    let given = data.to_str().unwrap();
+    let view = View::start(&place, &[given, "--watch"]);
+    view.saved("picture.png");
+    std::fs::write(&data, "0 0 0\n1 0 zero\n").unwrap();
+    let end = Instant::now() + Duration::from_secs(30);
+    let failure = loop {
+        let state: serde_json::Value = serde_json::from_slice(&view.get("state?client=a&after=0").1).unwrap();
+        if let Some(message) = state["failure"]["message"].as_str() {
+            break message.to_owned();
+        }
+        assert!(Instant::now() < end, "{state}");
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert!(failure.starts_with(&format!("{given}:2:")), "{failure}");
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
+fn a_file_that_a_page_hands_over_is_opened_within_the_limits_of_the_command() {
+    let place = Place::new(SMALL_SCENE);
+    let points = "x,y,z\n0,0,0\n1,0,0\n0,1,0\n0,0,1\n";
+    place.write("corner.csv", points);
+    let before = place.made();
+    let hand_over = |view: &View, name: &str, body: &str| {
+        let headers = format!("Content-Type: application/octet-stream\r\nContent-Length: {}\r\n", body.len());
+        let (status, answer) = view.ask(&format!("POST /{}/open?client=a&name={name}", view.token), &headers, body);
+        (status, String::from_utf8(answer).unwrap())
+    };
+    let view = View::start(&place, &["s.toml", "--size", "40x30", "--max-memory", "300000000"]);
+    let (status, refused) = hand_over(&view, "other.toml", SMALL_SCENE);
+    assert!(status == 422 && refused.contains("other.toml: expected a data file, found a scene"), "{refused}");
+    let (status, refused) = hand_over(&view, "other.docx", "what is this");
+    assert!(status == 422 && refused.contains("other.docx"), "{refused}");
+    let headers = "Content-Type: application/octet-stream\r\nContent-Length: 300000001\r\n";
+    let line = format!("POST /{}/open?client=a&name=large.csv", view.token);
+    let (status, refused) = view.ask(&line, headers, "");
+    assert!(status == 413 && String::from_utf8_lossy(&refused).contains("--max-memory"), "{status}");
+    let (status, opened) = hand_over(&view, "corner.csv", points);
+    assert!(status == 200 && opened.contains("\"title\":\"corner.csv\""), "{opened}");
+    let picture = view.saved("picture.png");
+    let scene = view.saved("scene");
+    let (code, told) = view.interrupted();
+    assert_eq!(code, Some(0), "{told}");
+    assert_eq!(place.made(), before, "nothing is left");
+    place.write("view.png", picture);
+    place.expect(0, &["render", "corner.csv", "--size", "40x30", "-o", "render.png"], "");
+    assert_eq!(place.pixels("view.png"), place.pixels("render.png"));
+    place.write("saved.toml", scene);
+    place.expect(0, &["render", "saved.toml", "-o", "saved.png"], "");
+    assert_eq!(place.pixels("saved.png"), place.pixels("render.png"));
+    // A recording is of one scene.
+    let view = View::start(&place, &["s.toml", "--record", "events.json"]);
+    let (status, refused) = hand_over(&view, "corner.csv", points);
+    assert!(status == 409 && refused.contains("--record"), "{refused}");
+    assert_eq!(view.interrupted().0, Some(0));
+}
+
+#[test]
 fn data_files_are_seen_as_render_draws_them() {
     let place = Place::new(SMALL_SCENE);
     place.write("corner.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
@@ -216,7 +280,11 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
     place.write("events.json", "[{\"do\": \"opacity\", \"object\": \"fog\", \"opacity\": 0.5}]");
     place.write("fly.json", "[{\"do\": \"fly\"}]");
     for (code, arguments, said) in [
-        (3, &["s.toml", "--play", "events.json"][..], "opacity"),
+        (
+            3,
+            &["s.toml", "--play", "events.json"][..],
+            "error: events.json:1: event 1 (`opacity`): opacity of object fog: ",
+        ),
         (3, &["s.toml", "--play", "fly.json"], "fly.json: unknown variant"),
         (4, &["s.toml", "--play", "none.json"], "cannot read the events"),
         (4, &["s.toml", "--record", "fly.json"], "fly.json"),
@@ -241,7 +309,11 @@ fn a_recording_of_another_scene_is_played_as_far_as_it_fits() {
     let (_, state) = view.get("state?client=a");
     assert!(String::from_utf8(state).unwrap().contains("\"exposure\":1.5"));
     let (code, told) = view.interrupted();
-    assert!(code == Some(0) && told.contains("event 0") && told.contains("found `renamed`"), "{told}");
+    assert!(
+        code == Some(0)
+            && told.contains("events.json:1: event 1 (`light_shadow`): expected the name of a light, found `renamed`"),
+        "{told}"
+    );
 }
 
 #[test]

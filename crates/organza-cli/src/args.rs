@@ -156,7 +156,7 @@ pub(super) enum Axis {
 }
 
 /// How data files without a scene are to be seen.
-#[derive(Debug, Args)]
+#[derive(Debug, Default, Args)]
 pub(super) struct FirstArguments {
     /// Where the eye is, degrees about the axis that points up [default: 30; 150 for scans of bodies]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = parse_finite)]

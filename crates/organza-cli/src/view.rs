@@ -1,17 +1,21 @@
 //! `organza view`.
 
-use super::args::ViewArguments;
+use super::args::{FirstArguments, ViewArguments};
 use super::console::bar::with_bar;
 use super::console::{self, signals};
-use super::given::given;
+use super::given::{given, is_scene, wish, write_first};
 use super::session::{overrides, parse_scene, processor_only, render_options, unused_goal, without_effect};
 use organza::output::{Target, Targets};
 use organza::scene::LoadOptions;
-use organza::{Error, InMemory, Progress, printable};
-use organza_view::{Ended, MOST_EVENTS, Opening, Recording, Server, Session, Watch, read_events};
+use organza::{Error, Files, InMemory, Progress, RenderOptions, printable};
+use organza_survey::Wish;
+use organza_view::{
+    Ended, EventFile, GivenFile, MOST_EVENTS, Opened, Opener, Opening, Recording, Server, Session, Watch,
+};
 use serde_json::json;
 use splat_core::MemoryAccount;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
@@ -19,17 +23,17 @@ use std::sync::Arc;
 pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     processor_only(&arguments.scene)?;
     arguments.record.as_ref().map(|path| Target::new(path, arguments.force)).transpose()?;
-    let played = arguments.play.as_ref().map(|path| read_events(path)).transpose()?.unwrap_or_default();
+    let played = arguments.play.as_ref().map(|path| EventFile::read(path)).transpose()?.unwrap_or_default();
     let address = arguments.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
-    let server = Server::bind(address)?;
-    let session = with_bar(|progress| open(arguments, progress))?;
+    let options = render_options(&arguments.scene);
+    let first = wish(&FirstArguments::default(), arguments.scene.common.size, None)?;
+    let opener = Opener::new(options.max_memory, move |file| open_handed_over(file, &first, &options));
+    let server = Server::bind(address)?.opening(opener);
+    let Opened { session, left_out } = with_bar(|progress| open(arguments, &played, progress))?;
+    left_out_events(&left_out).iter().for_each(|sentence| console::warn(sentence));
     // Whoever reads the address may interrupt at once.
     let ending = Arc::new(Progress::new());
     signals::stops(&ending);
-    if let Some(path) = &arguments.play {
-        let left_out = session.play(&played).map_err(|e| Error::input(printable(path), e.to_string(), e.hint()))?;
-        left_out_events(&printable(path), &left_out).iter().for_each(|sentence| console::warn(sentence));
-    }
     if !address.ip().is_loopback() {
         console::warn(&format!(
             "--listen {}: whoever can read along on the way to this machine sees the page and its address, as nothing is encrypted; a tunnel of ssh \
@@ -39,7 +43,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
     }
     if let Some(path) = &arguments.record {
         let mut recording = Recording::begin(path, arguments.force)?;
-        recording.add(&played);
+        recording.add(played.events());
         session.record(recording);
     }
     let session = Arc::new(session);
@@ -61,17 +65,17 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<(), Error> {
 const MOST_NAMED: usize = 5;
 
 /// What is said of recorded events that are left out.
-fn left_out_events(file: &str, left_out: &[String]) -> Vec<String> {
+fn left_out_events(left_out: &[String]) -> Vec<String> {
     let mut sentences: Vec<String> =
-        left_out.iter().take(MOST_NAMED).map(|sentence| format!("{file}: {sentence}; it is left out")).collect();
+        left_out.iter().take(MOST_NAMED).map(|sentence| format!("{sentence}; the event is left out")).collect();
     if left_out.len() > MOST_NAMED {
-        sentences.push(format!("{file}: {} more events are left out", left_out.len() - MOST_NAMED));
+        sentences.push(format!("--play: {} more events are left out", left_out.len() - MOST_NAMED));
     }
     sentences
 }
 
 /// Reads the scene, or makes one of data files, and begins to draw it.
-fn open(arguments: &ViewArguments, progress: &Progress) -> Result<Session, Error> {
+fn open(arguments: &ViewArguments, played: &EventFile, progress: &Progress) -> Result<Opened, Error> {
     let scene_arguments = &arguments.scene;
     let (given, files) = given(scene_arguments, None)?;
     let scene = parse_scene(scene_arguments, &given, None, None)?;
@@ -95,7 +99,34 @@ fn open(arguments: &ViewArguments, progress: &Progress) -> Result<Session, Error
     let names =
         scene_arguments.inputs.iter().map(|path| printable(path.file_name().unwrap_or(path.as_os_str()).as_ref()));
     let title = names.collect::<Vec<_>>().join(", ");
-    Session::open(Opening { title, file: given.file, text: given.bytes, load, options, files }, progress)
+    let input = |path: &PathBuf| GivenFile { path: path.clone(), name: printable(path) };
+    let inputs = scene_arguments.inputs.iter().map(input).collect();
+    let is_fleeting = false;
+    let opening = Opening { title, inputs, is_fleeting, file: given.file, text: given.bytes, load, options, files };
+    Session::open_playing(opening, played, progress)
+}
+
+/// Opens a data file that a page hands over, in a first scene of this size without other wishes: those on the command line are for other data.
+fn open_handed_over(given: GivenFile, wish: &Wish, options: &RenderOptions) -> Result<Session, Error> {
+    if is_scene(&given.path) {
+        let hint = "it names other files, which a page does not hand over: start `organza view` with it";
+        return Err(Error::input(given.name, "expected a data file, found a scene", hint));
+    }
+    let files = Files::default();
+    let file = given.path.with_extension("toml");
+    let written = write_first(std::slice::from_ref(&given.path), &file, wish, &files, options)?;
+    let load = LoadOptions { sandbox: true, memory: MemoryAccount::new(options.max_memory), ..LoadOptions::default() };
+    let opening = Opening {
+        title: given.name.clone(),
+        inputs: vec![given],
+        is_fleeting: true,
+        file,
+        text: written.text.into_bytes(),
+        load,
+        options: options.clone(),
+        files,
+    };
+    Session::open(opening, &Progress::new())
 }
 
 /// Prints where the page is, and opens it.

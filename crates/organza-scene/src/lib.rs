@@ -45,6 +45,7 @@ pub use material::model::SceneMaterial;
 pub use material::recipes::Recipe;
 pub use object::labels::{ObjectLabels, Table as LabelFile, read_label_table};
 pub use object::model::{SceneObject, Up, UpBy};
+pub use object::points_check::color_map_names;
 pub use object::points_look::PointsLook;
 pub use paths::{PATH_KEYS, ROOT_KEY, folder_above, relative_path, root_for};
 pub use render::layer_choice::{LAYER_NAMES, LayerChoice};

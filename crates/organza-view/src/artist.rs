@@ -80,6 +80,12 @@ impl Artist {
                     self.answer(desk, &request);
                     continue;
                 }
+                Job::Forget => {
+                    self.forget();
+                    desk.forget_values();
+                    desk.rests();
+                    continue;
+                }
             };
             if request.edition != self.edition {
                 self.forget();
@@ -303,9 +309,8 @@ impl Artist {
             return Err(Error::Cancelled);
         }
         let time = start.elapsed();
-        if let Some(bounds) = self.coarse.bounds() {
-            desk.keep_bounds(bounds);
-        }
+        let boxes = coarse.objects.iter().zip(self.coarse.object_bounds());
+        boxes.filter(|(_, bounds)| !bounds.is_empty()).for_each(|(object, bounds)| desk.keep_box(&object.name, bounds));
         let rested = self.detail.at_rest(&render.cost);
         // More pixels cost nothing before they are drawn.
         let is_rested = rested.share == self.detail.share && rested.divisor <= self.detail.divisor;

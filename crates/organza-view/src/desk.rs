@@ -82,6 +82,8 @@ pub(crate) enum Job {
     Draw(Arc<Request>),
     /// Say of the request whose whole picture is there how exact it is.
     Measure(Arc<Request>),
+    /// Let everything go that was read and made.
+    Forget,
 }
 
 /// What lies on the desk.
@@ -98,8 +100,8 @@ struct Papers {
     depths: Option<Arc<Depths>>,
     /// How often values of volumes occur, by the names of the objects.
     curves: BTreeMap<String, Values>,
-    /// A box around all that was drawn, world units.
-    bounds: Option<DAabb>,
+    /// Boxes around what was drawn of objects, world units, by the objects' names.
+    boxes: BTreeMap<String, DAabb>,
     /// Names of columns that objects can be coloured by, by the objects' names.
     columns: BTreeMap<String, Vec<String>>,
     /// What objects are made of, by their names.
@@ -113,6 +115,9 @@ struct Papers {
     failure: Option<Failure>,
     /// The viewpoint of the camera that the scene states.
     scene_viewpoint: Viewpoint,
+    /// Whether nothing is to be drawn, and whether what was read and made is forgotten since.
+    is_resting: bool,
+    is_forgotten: bool,
     is_closed: bool,
 }
 
@@ -136,8 +141,8 @@ pub(crate) struct Seen {
     pub(crate) effects: Option<Vec<EffectRow>>,
     /// How often values of volumes occur, by the names of the objects.
     pub(crate) curves: BTreeMap<String, Values>,
-    /// A box around all that was drawn, world units.
-    pub(crate) bounds: Option<DAabb>,
+    /// Boxes around what was drawn of objects, world units, by the objects' names.
+    pub(crate) boxes: BTreeMap<String, DAabb>,
     /// Names of columns that objects can be coloured by, by the objects' names.
     pub(crate) columns: BTreeMap<String, Vec<String>>,
     /// Settings from fast to exact; `None` before a page asks for them.
@@ -158,7 +163,7 @@ impl Desk {
             whole: None,
             depths: None,
             curves: BTreeMap::new(),
-            bounds: None,
+            boxes: BTreeMap::new(),
             columns: BTreeMap::new(),
             data: BTreeMap::new(),
             rungs: None,
@@ -166,6 +171,8 @@ impl Desk {
             is_asked: false,
             failure: None,
             scene_viewpoint,
+            is_resting: false,
+            is_forgotten: false,
             is_closed: false,
         };
         Self { papers: Mutex::new(papers), changed: Condvar::new(), versions: watch::Sender::new(0) }
@@ -213,7 +220,7 @@ impl Desk {
             whole: papers.whole.as_ref().map(|whole| whole.generation),
             effects: papers.whole.as_ref().map(|whole| whole.effects().to_vec()),
             curves: papers.curves.clone(),
-            bounds: papers.bounds,
+            boxes: papers.boxes.clone(),
             columns: papers.columns.clone(),
             rungs: papers.rungs.clone(),
             is_predicting: papers.is_predicting,
@@ -245,6 +252,37 @@ impl Desk {
         self.tell(papers);
     }
 
+    /// Has the artist forget what it read and made, and draw nothing until [`Desk::wake`]; false where that takes too long.
+    pub(crate) fn rest(&self, patience: Duration) -> bool {
+        let end = Instant::now() + patience;
+        let mut papers = self.papers();
+        papers.is_resting = true;
+        papers.is_forgotten = false;
+        papers.at_work.iter().for_each(|at_work| at_work.progress.cancel());
+        self.changed.notify_all();
+        loop {
+            let left = end.saturating_duration_since(Instant::now());
+            if papers.is_forgotten || papers.is_closed || left.is_zero() {
+                return papers.is_forgotten;
+            }
+            papers = self.changed.wait_timeout(papers, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Everything is forgotten that was read and made.
+    pub(crate) fn rests(&self) {
+        let mut papers = self.papers();
+        papers.is_forgotten = true;
+        self.tell(papers);
+    }
+
+    /// Has the artist draw again.
+    pub(crate) fn wake(&self) {
+        let mut papers = self.papers();
+        papers.is_resting = false;
+        self.tell(papers);
+    }
+
     /// Ends all work.
     pub(crate) fn close(&self) {
         let mut papers = self.papers();
@@ -259,6 +297,13 @@ impl Desk {
         loop {
             if papers.is_closed {
                 return None;
+            }
+            if papers.is_resting {
+                if !papers.is_forgotten {
+                    return Some(Job::Forget);
+                }
+                papers = self.changed.wait(papers).unwrap_or_else(PoisonError::into_inner);
+                continue;
             }
             let newest = papers.newest.clone().filter(|request| request.generation > papers.taken);
             if let Some(request) = newest {
@@ -282,7 +327,7 @@ impl Desk {
         let mut papers = self.papers();
         let progress = Arc::new(Progress::new());
         let is_old = papers.newest.as_ref().is_some_and(|newest| newest.generation > generation);
-        if papers.is_closed || (task != Task::Coarse && is_old) {
+        if papers.is_closed || papers.is_resting || (task != Task::Coarse && is_old) {
             progress.cancel();
         }
         papers.at_work = Some(AtWork { task, progress: Arc::clone(&progress) });
@@ -310,12 +355,13 @@ impl Desk {
         }
     }
 
-    /// Keeps a box around what was drawn, beside what was drawn before: a cut leaves less, and may go back.
-    pub(crate) fn keep_bounds(&self, bounds: DAabb) {
+    /// Keeps a box around what was drawn of an object, beside what was drawn before: a cut leaves less, and may go back.
+    pub(crate) fn keep_box(&self, object: &str, bounds: DAabb) {
         let mut papers = self.papers();
-        let whole = papers.bounds.map_or(bounds, |before| before.union(bounds));
-        if papers.bounds != Some(whole) {
-            papers.bounds = Some(whole);
+        let known = papers.boxes.get(object).copied();
+        let whole = known.map_or(bounds, |before| before.union(bounds));
+        if known != Some(whole) {
+            papers.boxes.insert(object.to_owned(), whole);
             self.tell(papers);
         }
     }
@@ -356,7 +402,7 @@ impl Desk {
     /// Forgets what is known of data.
     pub(crate) fn forget_values(&self) {
         let mut papers = self.papers();
-        papers.bounds = None;
+        papers.boxes.clear();
         papers.columns.clear();
         papers.curves.clear();
         papers.data.clear();

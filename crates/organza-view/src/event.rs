@@ -273,6 +273,12 @@ impl Event {
         }
     }
 
+    /// Its name in files.
+    pub(crate) fn word(&self) -> String {
+        let document = serde_json::to_value(self).unwrap_or_default();
+        document["do"].as_str().unwrap_or_default().to_owned()
+    }
+
     /// Whether it changes where the eye is, and nothing else.
     pub const fn is_of_viewpoint(&self) -> bool {
         matches!(

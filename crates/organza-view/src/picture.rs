@@ -182,6 +182,8 @@ pub struct EffectRow {
     pub predicted_ms: Option<f64>,
     /// Measured milliseconds of its passes; `None` also where what they make was kept.
     pub measured_ms: Option<f64>,
+    /// Effects that share the measured time evenly, as their passes are measured together; 1 for an effect that is measured alone.
+    pub sharing: usize,
 }
 
 /// The passes that run for effects of a kind alone; those of one kind share them.
@@ -209,6 +211,7 @@ impl EffectRow {
             fixed: kind.map_or(Some("no scene can switch it"), EffectKind::fixed_because),
             predicted_ms: None,
             measured_ms: None,
+            sharing: 1,
         }
     }
 
@@ -223,14 +226,15 @@ impl EffectRow {
         for kind in EffectKind::ALL {
             let is_simulated = |row: &&mut Self| row.called_for && !row.lacking && row.kind() == Some(kind);
             let mut simulated: Vec<&mut Self> = rows.iter_mut().filter(is_simulated).collect();
-            let parts = simulated.len() as f64;
+            let sharing = simulated.len();
             let of_kind = || passes.iter().filter(|pass| passes_of(kind).contains(&pass.name.as_str()));
             let sum = |time: fn(&PassRow) -> Option<f64>| of_kind().filter_map(time).reduce(|a, b| a + b);
             let predicted = sum(|pass| pass.predicted_ms);
             let measured = sum(|pass| pass.measured_ms);
             for row in &mut simulated {
-                row.predicted_ms = predicted.map(|ms| ms / parts);
-                row.measured_ms = measured.map(|ms| ms / parts);
+                row.predicted_ms = predicted.map(|ms| ms / sharing as f64);
+                row.measured_ms = measured.map(|ms| ms / sharing as f64);
+                row.sharing = sharing;
             }
         }
     }
@@ -412,6 +416,7 @@ mod tests {
             fixed: None,
             predicted_ms: None,
             measured_ms: None,
+            sharing: 1,
         };
         let mut rows = [row("shadow.a", true), row("shadow.b", false), row("shadow.c", true), row("light.a", true)];
         let pass = |name: &str, predicted_ms, measured_ms| PassRow { name: name.into(), predicted_ms, measured_ms };
@@ -419,6 +424,7 @@ mod tests {
         EffectRow::add_times(&mut rows, &passes);
         let times: Vec<_> = rows.iter().map(|row| row.predicted_ms.zip(row.measured_ms)).collect();
         assert_eq!(times, [Some((15.0, 4.0)), None, Some((15.0, 4.0)), None]);
+        assert_eq!(rows.map(|row| row.sharing), [2, 1, 2, 1]);
     }
 
     #[test]

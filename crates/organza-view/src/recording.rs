@@ -1,53 +1,14 @@
-//! Files of events, which replay a session.
+//! Files of events that grow while they happen.
 
 use crate::event::Event;
+use organza::Error;
 use organza::output::Target;
-use organza::{Error, printable};
 use std::fs::{File, OpenOptions};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Most events of a recording.
 pub const MOST_EVENTS: usize = 100_000;
-
-/// Most bytes of a file of events.
-const MOST_BYTES: u64 = 16 << 20;
-
-/// Reads a file of events, a JSON list.
-///
-/// # Errors
-/// [`Error::Io`] for a file that cannot be read, or is no regular file; [`Error::Input`] with line and column for another text, for numbers out of
-/// range, and for a file of more than 16 MiB or more than [`MOST_EVENTS`] events.
-pub fn read_events(path: &Path) -> Result<Vec<Event>, Error> {
-    let fail = |e| Error::io(path, "cannot read the events", e);
-    // Asked before opening: opening a pipe waits for its writer.
-    if !std::fs::metadata(path).map_err(fail)?.is_file() {
-        return Err(fail(std::io::Error::other("not a regular file")));
-    }
-    let mut text = Vec::new();
-    let file = std::fs::File::open(path).map_err(fail)?;
-    file.take(MOST_BYTES + 1).read_to_end(&mut text).map_err(fail)?;
-    let input = |message: String, hint: &str| Error::input(printable(path), message, hint);
-    if text.len() as u64 > MOST_BYTES {
-        return Err(input(format!("expected at most {MOST_BYTES} bytes of events, found more"), "play it in parts"));
-    }
-    let events: Vec<Event> = serde_json::from_slice(&text).map_err(|e| {
-        let hint = if e.is_eof() && text.starts_with(b"[") {
-            "the list breaks off: delete what stands behind its last whole event, and the comma before that, and end it with ]"
-        } else {
-            "expected a list such as [{\"do\": \"orbit\", \"right\": 0.1, \"up\": 0}]; docs/view.md lists the events"
-        };
-        input(organza::shown(&e.to_string()).to_string(), hint)
-    })?;
-    if events.len() > MOST_EVENTS {
-        let count = events.len();
-        return Err(input(format!("expected at most {MOST_EVENTS} events, found {count}"), "play it in parts"));
-    }
-    for (rank, event) in events.iter().enumerate() {
-        event.check().map_err(|e| input(format!("event {rank}: {e}"), e.hint()))?;
-    }
-    Ok(events)
-}
 
 /// A file of events that grows with them. The file is a readable list after every event, also if the view is killed.
 #[derive(Debug)]
@@ -116,6 +77,11 @@ impl Recording {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::replay::EventFile;
+
+    fn read_events(path: &Path) -> Vec<Event> {
+        EventFile::read(path).unwrap().events().to_vec()
+    }
 
     #[test]
     fn what_is_written_is_read_again() {
@@ -126,13 +92,13 @@ mod tests {
             [Event::Reset {}, Event::Zoom { steps: 0.1 + 0.2 }, Event::Show { object: "a\n]\n".into(), visible: true }];
         // It is whole after every event, without an end.
         for count in 0..=events.len() {
-            assert_eq!(read_events(&path).unwrap(), events[..count]);
+            assert_eq!(read_events(&path), events[..count]);
             recording.add(&events[count..events.len().min(count + 1)]);
         }
         assert!(!recording.end().unwrap());
         assert!(Recording::begin(&path, false).unwrap_err().to_string().contains("exists already"));
         Recording::begin(&path, true).unwrap();
-        assert_eq!(read_events(&path).unwrap(), []);
+        assert_eq!(read_events(&path), []);
     }
 
     #[test]
@@ -144,38 +110,9 @@ mod tests {
         recording.add(&[Event::Reset {}, Event::Reset {}]);
         recording.add(&[Event::Reset {}]);
         assert!(recording.end().unwrap());
-        assert_eq!(read_events(&path).unwrap().len(), MOST_EVENTS);
+        assert_eq!(read_events(&path).len(), MOST_EVENTS);
         let text = std::fs::read(&path).unwrap();
         std::fs::write(&path, &text[..text.len() - 5]).unwrap();
-        assert!(read_events(&path).unwrap_err().hint().contains("the list breaks off"));
-    }
-
-    #[test]
-    fn hostile_files_are_refused_by_name() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("events.json");
-        let deep = "[".repeat(100_000);
-        let many = format!("[{}{{\"do\":\"reset\"}}]", "{\"do\":\"reset\"},".repeat(MOST_EVENTS));
-        for text in [
-            "",
-            "{}",
-            "null",
-            "[1]",
-            "[{\"do\":\"orbit\",\"right\":1e400,\"up\":0}]",
-            "[{\"do\":\"orbit\",\"right\":1001,\"up\":0}]",
-            "[{\"do\":\"reset\"}",
-            "[{\"do\":\"reset\"}] x",
-            "[{\"do\":\"\u{1b}[2J\"}]",
-            "\u{0}\u{1}",
-            &deep,
-            &many,
-        ] {
-            std::fs::write(&path, text).unwrap();
-            let error = read_events(&path).unwrap_err().to_string();
-            assert!(error.contains("events.json") && error.len() < 1000, "{error}");
-            assert!(!error.contains('\u{1b}'), "{error:?}");
-        }
-        assert!(read_events(folder.path()).unwrap_err().to_string().contains("not a regular file"));
-        assert!(read_events(&folder.path().join("none.json")).is_err());
+        assert!(EventFile::read(&path).unwrap_err().hint().contains("the list breaks off"));
     }
 }

@@ -3,6 +3,7 @@
 mod clients;
 mod serving;
 mod token;
+mod upload;
 
 use crate::session::Session;
 use clients::Clients;
@@ -10,7 +11,7 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use organza::{Error, Progress};
-use serving::{Counter, answer};
+use serving::{Counter, Current, answer};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::path::Path;
 use std::pin::pin;
@@ -20,6 +21,7 @@ use token::Token;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
+pub use upload::Opener;
 
 /// Sockets that are served at a time; others wait until one is free.
 const MOST_SOCKETS: usize = 32;
@@ -46,6 +48,7 @@ pub struct Server {
     address: SocketAddr,
     token: Token,
     framing: Framing,
+    opener: Option<Opener>,
 }
 
 /// The pages that may embed this page.
@@ -76,13 +79,19 @@ impl Server {
         let listener = std::net::TcpListener::bind(address).map_err(fail)?;
         listener.set_nonblocking(true).map_err(fail)?;
         let address = listener.local_addr().map_err(fail)?;
-        Ok(Self { listener, address, token: Token::new()?, framing: Framing::Nobody })
+        Ok(Self { listener, address, token: Token::new()?, framing: Framing::Nobody, opener: None })
     }
 
     /// Returns the server with another choice of pages that may embed its page.
     #[must_use]
     pub fn framed_by(self, framing: Framing) -> Self {
         Self { framing, ..self }
+    }
+
+    /// Returns the server with an opener of data files that a page hands over; others open none.
+    #[must_use]
+    pub fn opening(self, opener: Opener) -> Self {
+        Self { opener: Some(opener), ..self }
     }
 
     /// The address of the page, with its token.
@@ -100,9 +109,11 @@ impl Server {
         let internal = |e: std::io::Error| Error::Internal(format!("the server of the page: {e}"));
         let runtime =
             tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build().map_err(internal)?;
-        let Self { listener, address, token, framing } = self;
+        let Self { listener, address, token, framing, opener } = self;
         let clients = Mutex::new(Clients::default());
-        let counter = Arc::new(Counter { session: Arc::clone(session), clients, token, address, framing });
+        let current = Mutex::new(Current::new(Arc::clone(session)));
+        let turn = Semaphore::new(1);
+        let counter = Arc::new(Counter { current, clients, token, address, framing, opener, turn });
         let ended = runtime.block_on(async {
             let listener = TcpListener::from_std(listener).map_err(internal)?;
             tokio::spawn(accept(listener, Arc::clone(&counter)));
@@ -117,6 +128,8 @@ impl Server {
             }
         });
         runtime.shutdown_timeout(FAREWELL);
+        // Also where a file is being opened still.
+        counter.current().end();
         ended
     }
 }

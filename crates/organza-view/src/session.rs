@@ -9,18 +9,22 @@ use crate::depths::below::{Below, below};
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
 use crate::event::{Cut, Event};
-use crate::lights::{LightRow, direction_of, kind_of as kind_of_light};
+use crate::lights::{Direction, LightRow, direction_of, kind_of as kind_of_light};
 use crate::picture::{Drawn, EffectRow, Facts, Level, Picture, Size};
 use crate::recording::Recording;
+use crate::replay::{EventFile, Replayed, replayed};
 use crate::scene_text;
 use crate::state::{Opening, Source, State};
 use crate::viewpoint::Viewpoint;
+use crate::wording::GivenNames;
 use organza::output::Format;
 use organza::scene::{self, Scene, SceneLight, SceneObject};
 use organza::{Context, Error, Progress};
 use serde::Serialize;
+use splat_core::glam::DVec3;
 use splat_core::{DAabb, Projection};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -32,8 +36,16 @@ const FAREWELL: Duration = Duration::from_millis(600);
 /// How long whoever asks for the place below the pointer waits for a coarse picture of it.
 const LOOK_BELOW: Duration = Duration::from_secs(10);
 
+/// How long a session that is to rest waits for its artist: passes hear of it at their next step.
+const REST: Duration = Duration::from_secs(10);
+
+/// Sessions that were begun in this process.
+static SESSIONS: AtomicU64 = AtomicU64::new(0);
+
 /// A scene that is viewed: its state, and the thread that draws it.
 pub struct Session {
+    /// Another one for each session of the process.
+    number: u64,
     desk: Arc<Desk>,
     studio: Mutex<Studio>,
     /// The picture that was kept.
@@ -49,9 +61,19 @@ struct Keeping {
     comparison: Option<Arc<Comparison>>,
 }
 
+/// A session that has begun.
+pub struct Opened {
+    /// The session.
+    pub session: Session,
+    /// The recorded events that are left out, a sentence for each.
+    pub left_out: Vec<String>,
+}
+
 /// What events change.
 struct Studio {
     title: String,
+    names: GivenNames,
+    is_fleeting: bool,
     source: Source,
     /// The scene as the command line has it.
     stated: Scene,
@@ -71,6 +93,8 @@ struct Studio {
 /// The state that a page shows beside the picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Shown {
+    /// The session: it is another one after a page has opened a file.
+    pub session: u64,
     /// Grows with every change.
     pub version: u64,
     /// The state; a session's states are counted from 1.
@@ -89,8 +113,10 @@ pub struct Shown {
     pub lights: Vec<LightRow>,
     /// The planes that cut objects open, beside those of the scene.
     pub cuts: Vec<Cut>,
-    /// The lowest and the highest corner of a box around everything, cut away or not, world units; `None` before the first picture.
-    pub bounds: Option<[[f64; 3]; 2]>,
+    /// A box around everything, cut away or not; `None` before the first picture.
+    pub bounds: Option<ShownBox>,
+    /// Names of the maps that colour an object by a column.
+    pub maps: Vec<&'static str>,
     /// The effects of the newest picture, with the present switches. The whole picture of the state counts as newest
     /// once it is drawn.
     pub effects: Vec<EffectRow>,
@@ -125,6 +151,21 @@ pub struct ShownAccuracy {
     pub is_predicting: bool,
 }
 
+/// A box along the axes of the world, world units.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShownBox {
+    /// Its lowest corner.
+    pub low: [f64; 3],
+    /// Its highest corner.
+    pub high: [f64; 3],
+}
+
+impl ShownBox {
+    const fn new(bounds: &DAabb) -> Self {
+        Self { low: bounds.min.to_array(), high: bounds.max.to_array() }
+    }
+}
+
 /// The viewpoint of the eye, as the page shows it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ShownViewpoint {
@@ -144,6 +185,8 @@ pub struct ShownViewpoint {
     pub height: f64,
     /// Whether rays of the view are parallel.
     pub is_parallel: bool,
+    /// The places of an eye that looks against the axes of the world, x, y and z.
+    pub axes: Vec<Direction>,
 }
 
 impl ShownViewpoint {
@@ -157,6 +200,7 @@ impl ShownViewpoint {
             up: viewpoint.upwards().to_array(),
             height: viewpoint.height(),
             is_parallel: matches!(viewpoint.projection, Projection::Orthographic { .. }),
+            axes: DVec3::AXES.map(|axis| viewpoint.direction_to(axis)).to_vec(),
         }
     }
 }
@@ -188,6 +232,8 @@ pub struct ObjectRow {
     pub takes_color: bool,
     /// The transfer function of a volume.
     pub curve: Option<CurveRow>,
+    /// A box around it, cut away or not; `None` before the first picture, and for an object without anything.
+    pub bounds: Option<ShownBox>,
 }
 
 /// A picture in the making.
@@ -205,38 +251,51 @@ impl Session {
     /// # Errors
     /// Those of [`scene::parse`], and those of reading data where that places the camera.
     pub fn open(opening: Opening, progress: &Progress) -> Result<Self, Error> {
-        let Opening { title, file, text, load, options, files } = opening;
+        Ok(Self::open_playing(opening, &EventFile::default(), progress)?.session)
+    }
+
+    /// The same with recorded events: what is drawn first is the state behind the last of them. Events that name an object or a light which the scene lacks
+    /// are left out.
+    ///
+    /// # Errors
+    /// As [`Session::open`]. [`Error::Input`] that names the place of an event for a scene that is refused with it, and for a column that its file lacks.
+    pub fn open_playing(opening: Opening, played: &EventFile, progress: &Progress) -> Result<Opened, Error> {
+        let Opening { title, inputs, is_fleeting, file, text, load, options, files } = opening;
         let is_on_disk = file.is_file();
         let source = Source { file, text, load };
         let mut stated = source.scene(source.load.overrides.clone())?;
-        let first =
-            Viewpoint::of_scene(&organza::fitted(&stated, Context { files: &files, options: &options, progress })?.0);
+        let context = Context { files: &files, options: &options, progress };
+        let first = Viewpoint::of_scene(&organza::fitted(&stated, context)?.0);
         // Where the scene has its camera found, this is what lights go around.
         stated.target = first.centre;
+        let names = GivenNames::new(&stated, &inputs);
+        let Replayed { state, left_out } = replayed(played, &source, &stated, &first, context)?;
         let desk = Arc::new(Desk::new(first));
         let artist = Artist::new(files, options);
         let board = Arc::clone(&desk);
         let thread = std::thread::Builder::new().name("artist".into()).spawn(move || artist.work(&board));
         let thread = thread.map_err(|e| Error::Internal(format!("a thread that draws: {e}")))?;
-        let state = State::default();
         let scene = stated.clone();
         let uncut = Arc::new(stated.objects.clone());
-        let studio = Studio {
+        let mut studio = Studio {
             title,
+            names,
+            is_fleeting,
             source,
             stated,
             uncut,
-            state,
+            state: State::default(),
             scene,
             generation: 0,
             edition: 0,
             is_on_disk,
             recording: None,
         };
+        studio.take(state, &desk)?;
+        let number = SESSIONS.fetch_add(1, Ordering::Relaxed);
         let session =
-            Self { desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
-        session.apply(&[])?;
-        Ok(session)
+            Self { number, desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
+        Ok(Opened { session, left_out })
     }
 
     fn studio(&self) -> MutexGuard<'_, Studio> {
@@ -275,28 +334,6 @@ impl Session {
             centre: Some(centre.to_array()),
         }])?;
         Ok(true)
-    }
-
-    /// Takes recorded events in. Leaves out events that name something which the scene lacks, and returns a sentence for each.
-    ///
-    /// # Errors
-    /// Errors of the scene with the other events; the state is then as before.
-    pub fn play(&self, events: &[Event]) -> Result<Vec<String>, Error> {
-        let mut studio = self.studio();
-        let first = self.desk.scene_viewpoint();
-        let mut state = studio.state.clone();
-        let mut left_out = Vec::new();
-        for (rank, event) in events.iter().enumerate() {
-            // An event that fails changes nothing.
-            if let Err(error) = state.apply(event, &studio.stated, &first) {
-                left_out.push(format!("event {rank}: {error}"));
-            }
-        }
-        studio.take(state, &self.desk)?;
-        if let Some(recording) = &mut studio.recording {
-            recording.add(events);
-        }
-        Ok(left_out)
     }
 
     fn kept(&self) -> MutexGuard<'_, Option<Keeping>> {
@@ -360,6 +397,22 @@ impl Session {
         self.desk.ask_for_rungs();
     }
 
+    /// Lets everything go that was read and made, and draws nothing until [`Session::wake`]; false where that takes too long.
+    pub(crate) fn rest(&self) -> bool {
+        self.desk.rest(REST)
+    }
+
+    /// Draws again, with files that are read anew.
+    pub(crate) fn wake(&self) {
+        self.desk.wake();
+        self.reload();
+    }
+
+    /// Whether its events are recorded.
+    pub(crate) fn is_recording(&self) -> bool {
+        self.studio().recording.is_some()
+    }
+
     /// Records events from now on.
     pub fn record(&self, recording: Recording) {
         self.studio().recording = Some(recording);
@@ -391,7 +444,7 @@ impl Session {
     /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
-        let Seen { version, picture, failure, drawing, whole, effects, curves, bounds, columns, rungs, is_predicting } =
+        let Seen { version, picture, failure, drawing, whole, effects, curves, boxes, columns, rungs, is_predicting } =
             self.desk.seen();
         let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         let row = |(rank, object): (usize, &SceneObject)| ObjectRow {
@@ -407,6 +460,7 @@ impl Session {
             is_recolored: studio.state.is_recolored(rank),
             takes_color: takes_color(object),
             curve: CurveRow::of_object(object, curves.get(&object.name)),
+            bounds: boxes.get(&object.name).map(ShownBox::new),
         };
         let light = |(rank, light): (usize, &SceneLight)| LightRow {
             name: light.label.clone(),
@@ -422,6 +476,7 @@ impl Session {
         let facts = picture.as_ref().map(|picture| &picture.facts);
         let effects = effects.as_deref().or(facts.map(|facts| facts.effects.as_slice())).unwrap_or_default();
         Shown {
+            session: self.number,
             version,
             generation: studio.generation,
             title: studio.title.clone(),
@@ -431,7 +486,8 @@ impl Session {
             objects: studio.scene.objects.iter().enumerate().map(row).collect(),
             lights: studio.scene.lights.iter().enumerate().map(light).collect(),
             cuts: studio.state.cuts().to_vec(),
-            bounds: bounds.map(|DAabb { min, max }| [min.to_array(), max.to_array()]),
+            bounds: boxes.values().copied().reduce(DAabb::union).as_ref().map(ShownBox::new),
+            maps: scene::color_map_names().collect(),
             effects: effects.iter().map(switched).collect(),
             layer: studio.state.layer().map(str::to_owned),
             accuracy: rungs.map(|rungs| ShownAccuracy {
@@ -442,10 +498,10 @@ impl Session {
             }),
             technique: studio.state.technique().map(str::to_owned),
             kept: self.kept().as_ref().map(|keeping| keeping.kept.row.clone()),
-            picture: picture.map(|picture| picture.facts.clone()),
+            picture: picture.map(|picture| studio.names.in_facts(&picture.facts)),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
             is_whole: whole == Some(studio.generation),
-            failure,
+            failure: failure.map(|failure| Failure { message: studio.names.in_text(&failure.message), ..failure }),
         }
     }
 
@@ -491,6 +547,9 @@ impl Session {
         let differs = || Error::Internal("the text of this scene is not read as the scene that is seen".into());
         if read != *scene {
             return Err(differs());
+        }
+        if studio.is_fleeting {
+            return Ok(text);
         }
         let data: Vec<PathBuf> = scene.files().into_iter().filter(|file| *file != source.file).collect();
         let text = scene_text::anywhere(source, &text, &data)?;

@@ -16,6 +16,10 @@ use std::path::PathBuf;
 pub struct Opening {
     /// The title of the page: the names of the opened files.
     pub title: String,
+    /// Data files by the names that the person gave them: a scene that is made of them names them from its folder.
+    pub inputs: Vec<GivenFile>,
+    /// Whether its data is removed with the session: a scene that is saved then names it without a folder.
+    pub is_fleeting: bool,
     /// The scene's file, which gives the format and the folder that paths are relative to; it need not be there.
     pub file: PathBuf,
     /// Its text.
@@ -28,6 +32,15 @@ pub struct Opening {
     pub files: Files,
 }
 
+/// A data file, and what the person calls it.
+#[derive(Debug, Clone)]
+pub struct GivenFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its name in messages.
+    pub name: String,
+}
+
 impl Opening {
     /// A scene from its text alone.
     pub fn of_text(file: impl Into<PathBuf>, text: impl Into<Vec<u8>>, options: RenderOptions) -> Self {
@@ -35,7 +48,8 @@ impl Opening {
         let load = LoadOptions { memory, in_memory: InMemory::default(), ..LoadOptions::default() };
         let file = file.into();
         let title = printable(file.file_name().unwrap_or(file.as_os_str()).as_ref());
-        Self { title, file, text: text.into(), load, options, files: Files::default() }
+        let text = text.into();
+        Self { title, inputs: Vec::new(), is_fleeting: false, file, text, load, options, files: Files::default() }
     }
 }
 

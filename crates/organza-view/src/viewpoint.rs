@@ -1,5 +1,6 @@
 //! The eye on a ball around a centre.
 
+use crate::lights::Direction;
 use libm::{atan2, exp2, sincos};
 use organza::scene::Scene;
 use splat_core::glam::DVec3;
@@ -99,6 +100,18 @@ impl Viewpoint {
     #[must_use]
     pub fn orbited(self, right: f64, up: f64) -> Self {
         self.looking_from(self.azimuth - right * PI, self.elevation - up * PI)
+    }
+
+    /// Azimuth and elevation of an eye in the direction of a unit vector.
+    pub(crate) fn direction_to(&self, to: DVec3) -> Direction {
+        let frame = Frame::around(self.pole);
+        let height = to.dot(self.pole);
+        let level = to - self.pole * height;
+        // Along the pole every azimuth is the same direction.
+        let azimuth =
+            if level.length() < ROUNDING { 0.0 } else { atan2(level.dot(frame.quarter), level.dot(frame.zero)) };
+        let elevation = atan2(height, level.length());
+        Direction { azimuth: azimuth.to_degrees(), elevation: elevation.to_degrees() }
     }
 
     /// At this azimuth and elevation, radians.

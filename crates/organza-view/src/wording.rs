@@ -1,6 +1,9 @@
 //! Errors in the words of the page, because its users type no command line.
 
-use organza::Error;
+use crate::picture::Facts;
+use crate::state::GivenFile;
+use organza::scene::Scene;
+use organza::{Error, printable};
 
 /// What is found wrong, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,7 +14,7 @@ pub(crate) struct Said {
 }
 
 /// Words of a command line or a scene file, and those of the page.
-const WORDS: [(&str, &str); 14] = [
+const WORDS: [(&str, &str); 13] = [
     ("`organza explain` lists the effects of a scene by name", "the panel Effects lists them"),
     ("use a smaller camera.size or render.antialias", "choose a smaller size"),
     (
@@ -22,7 +25,6 @@ const WORDS: [(&str, &str); 14] = [
     ("a smaller image", "a smaller size"),
     ("or a larger --max-memory", "or start the view again with a larger --max-memory"),
     ("a larger --max-memory makes", "starting the view again with a larger --max-memory makes"),
-    ("name its technique", "name its technique in the scene file"),
     ("write PATH=VALUE, such as --set render.points.exact=true", ""),
     ("`size`: expected", "expected"),
     ("`exposure`: expected", "expected"),
@@ -61,6 +63,43 @@ fn without_option(text: &str) -> String {
         ["object", name, "transfer"] => named(format!("curve of {name}"), rest),
         [list @ ("object" | "light"), name, key] => named(format!("{key} of {list} {name}"), rest),
         _ => named(path.to_owned(), rest),
+    }
+}
+
+/// The names of data files in a scene that is made of them, and those that the person gave them.
+#[derive(Debug, Default)]
+pub(crate) struct GivenNames(Vec<GivenName>);
+
+#[derive(Debug)]
+struct GivenName {
+    in_scene: String,
+    given: String,
+}
+
+impl GivenNames {
+    /// Of the files that a scene reads those that were given by another name.
+    pub(crate) fn new(scene: &Scene, inputs: &[GivenFile]) -> Self {
+        let files = scene.files();
+        let name = |given: &GivenFile| {
+            let real = given.path.canonicalize().ok()?;
+            let in_scene = files.iter().find(|file| file.canonicalize().is_ok_and(|file| file == real))?;
+            Some(GivenName { in_scene: printable(in_scene), given: given.name.clone() })
+        };
+        let mut names: Vec<_> = inputs.iter().filter_map(name).filter(|name| name.in_scene != name.given).collect();
+        // A long name may end with a short one.
+        names.sort_by_key(|name| std::cmp::Reverse(name.in_scene.len()));
+        Self(names)
+    }
+
+    /// A text that calls files as the person does.
+    pub(crate) fn in_text(&self, text: &str) -> String {
+        self.0.iter().fold(text.to_owned(), |text, name| text.replace(&name.in_scene, &name.given))
+    }
+
+    /// The facts about a picture, which call files as the person does.
+    pub(crate) fn in_facts(&self, facts: &Facts) -> Facts {
+        let texts = |texts: &[String]| texts.iter().map(|text| self.in_text(text)).collect();
+        Facts { warnings: texts(&facts.warnings), notes: texts(&facts.notes), ..facts.clone() }
     }
 }
 

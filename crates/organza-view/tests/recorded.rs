@@ -4,7 +4,7 @@
 use organza::output::{Format, Metadata, Params, displayed_bytes, encode};
 use organza::scene::{LoadOptions, Scene, parse};
 use organza::{Progress, RenderOptions, render};
-use organza_view::{Event, Knot, Level, Opening, PicturePlace, Recording, Session, Switch, read_events};
+use organza_view::{Event, EventFile, Knot, Level, Opened, Opening, PicturePlace, Recording, Session, Switch};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -172,7 +172,7 @@ fn events_that_a_scene_refuses_change_nothing() {
         assert!(!error.to_string().is_empty(), "{bad:?}");
     }
     assert_eq!(session.shown().generation, 1);
-    assert_eq!(read_events(&path).unwrap(), []);
+    assert_eq!(EventFile::read(&path).unwrap().events(), []);
     assert!(Arc::ptr_eq(&session.whole_picture().unwrap(), &before));
 }
 
@@ -288,7 +288,7 @@ fn a_double_click_centres_on_what_is_seen() {
     session.apply(&[Event::Zoom { steps: -12.0 }]).unwrap();
     assert!(!session.centre_on(PicturePlace { right: 0.01, down: 0.01 }).unwrap());
     // What is recorded needs no picture.
-    let events = read_events(&path).unwrap();
+    let events = EventFile::read(&path).unwrap().events().to_vec();
     assert_eq!(events.iter().filter(|event| matches!(event, Event::LookFrom { centre: Some(_), .. })).count(), 2);
 }
 
@@ -456,7 +456,7 @@ fn accuracy_is_predicted_and_measured_and_is_that_of_the_scene() {
     // The scene's own accuracy has its own bits again.
     session.apply(&[Event::Reset {}, Event::Accuracy { step: 0, set: Vec::new() }]).unwrap();
     assert!(pixels(&session.whole_picture().unwrap().png) == pixels(&first_picture.png));
-    let events = read_events(&path).unwrap();
+    let events = EventFile::read(&path).unwrap().events().to_vec();
     assert_eq!(events.iter().filter(|event| matches!(event, Event::Accuracy { .. })).count(), 3);
 }
 
@@ -517,15 +517,57 @@ fn what_lies_below_the_pointer_is_told() {
 
 #[test]
 fn recorded_events_that_name_nothing_of_the_scene_are_left_out() {
-    let session = session(HEAD);
-    let renamed = Event::LightShadow { light: "moon".into(), shadow: false };
-    let left_out = session.play(&[renamed, Event::Exposure { stops: 1.0 }]).unwrap();
-    assert!(
-        left_out.len() == 1 && left_out[0].starts_with("event 0: ") && left_out[0].contains("moon"),
-        "{left_out:?}"
-    );
+    let renamed = r#"{"do": "light_shadow", "light": "moon", "shadow": false}"#;
+    let Opened { session, left_out } = played(&format!("[\n{renamed},\n{BRIGHTER}]")).unwrap();
+    let said = "events.json:2: event 1 (`light_shadow`): expected the name of a light, found `moon`";
+    assert!(left_out.len() == 1 && left_out[0].ends_with(said), "{left_out:?}");
     assert_eq!(session.shown().exposure, 1.0);
-    assert!(session.play(&[Event::Exposure { stops: 1e9 }]).is_err());
+}
+
+const BRIGHTER: &str = r#"{"do": "exposure", "stops": 1}"#;
+
+/// A session that begins with a file of events.
+fn played(events: &str) -> Result<Opened, organza::Error> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("events.json");
+    std::fs::write(&path, events).unwrap();
+    Session::open_playing(opening(HEAD), &EventFile::read(&path)?, &Progress::new())
+}
+
+#[test]
+fn a_recorded_event_that_is_refused_is_named_with_its_place() {
+    let refused = |event: &str, after: &str, said: &str| {
+        let error = played(&format!("[{BRIGHTER},\n{BRIGHTER}, {event}{after}]")).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(&format!("events.json:2: event 3 {said}")) && !error.contains("--set"), "{error}");
+    };
+    // By the event alone, by the scene, and by the scene before others that it takes.
+    refused(r#"{"do": "zoom", "steps": 1e9}"#, "", "(`zoom`): `steps`: expected");
+    let technique = r#"{"do": "technique", "technique": "magic"}"#;
+    refused(technique, "", "(`technique`): render.technique: ");
+    let many = format!(",\n{BRIGHTER}").repeat(20);
+    refused(technique, &many, "(`technique`): render.technique: ");
+}
+
+#[test]
+fn a_recorded_column_that_the_file_lacks_is_refused_with_those_that_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cloud.csv"), "x,y,z,heat\n0,0,0,1\n1,0,0,2\n0,1,0,3\n").unwrap();
+    let scene =
+        "version = 1\n[camera]\nauto = true\nsize = [16, 12]\n[[object]]\nname = \"cloud\"\npoints = \"cloud.csv\"\n";
+    let path = folder.path().join("events.json");
+    for (visible, column, is_there) in [(true, "heat", true), (true, "cold", false), (false, "cold", false)] {
+        let events = format!(
+            "[{{\"do\": \"show\", \"object\": \"cloud\", \"visible\": {visible}}}, {{\"do\": \"color_by\", \"object\": \"cloud\", \"column\": \"{column}\", \"map\": null}}]"
+        );
+        std::fs::write(&path, events).unwrap();
+        let opening = Opening::of_text(folder.path().join("scene.toml"), scene, RenderOptions::default());
+        let opened = Session::open_playing(opening, &EventFile::read(&path).unwrap(), &Progress::new());
+        let error = opened.map(|_| ()).map_err(|error| error.to_string());
+        let is_named = |error: &String| {
+            error.contains("events.json:1: event 2 (`color_by`)") && error.contains("`cold`") && error.contains("heat")
+        };
+        assert!(if is_there { error.is_ok() } else { error.as_ref().is_err_and(is_named) }, "{column}: {error:?}");
+    }
 }
 
 #[test]

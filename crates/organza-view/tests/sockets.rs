@@ -1,10 +1,11 @@
 //! The server by real sockets: who is answered, who is refused, and that nobody holds it.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use organza::{Progress, RenderOptions};
-use organza_view::{Ended, Framing, Opening, Server, Session};
+use organza::{Error, Progress, RenderOptions};
+use organza_view::{Ended, Framing, GivenFile, Opener, Opening, Server, Session};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -30,13 +31,13 @@ struct Running {
 
 impl Running {
     fn start() -> Self {
-        Self::start_framed(Framing::Nobody)
+        Self::start_with(|server| server)
     }
 
-    fn start_framed(framing: Framing) -> Self {
+    fn start_with(choice: impl FnOnce(Server) -> Server) -> Self {
         let opening = Opening::of_text("scene.toml", SCENE, RenderOptions::default());
         let session = Arc::new(Session::open(opening, &Progress::new()).unwrap());
-        let server = Server::bind("127.0.0.1:0".parse().unwrap()).unwrap().framed_by(framing);
+        let server = choice(Server::bind("127.0.0.1:0".parse().unwrap()).unwrap());
         let url = server.url();
         let rest = url.strip_prefix("http://").unwrap();
         let (address, token) = rest.trim_end_matches('/').split_once('/').unwrap();
@@ -113,6 +114,9 @@ fn the_page_and_its_parts_are_served_under_one_policy() {
         ("", "text/html"),
         ("page.js", script),
         ("curve.js", script),
+        ("cut.js", script),
+        ("overlay.js", script),
+        ("open.js", script),
         ("judge.js", script),
         ("save.js", script),
         ("page.css", "text/css"),
@@ -137,7 +141,7 @@ fn the_page_and_its_parts_are_served_under_one_policy() {
 
 #[test]
 fn notebooks_of_this_machine_may_show_the_page_where_that_is_allowed() {
-    let running = Running::start_framed(Framing::ThisMachine);
+    let running = Running::start_with(|server| server.framed_by(Framing::ThisMachine));
     let answer = running.get("");
     let policy = answer.head.lines().find(|line| line.starts_with("content-security-policy:")).unwrap();
     assert!(policy.ends_with("frame-ancestors http://localhost:* http://127.0.0.1:* http://[::1]:*"), "{policy}");
@@ -196,6 +200,10 @@ fn a_picture_is_kept_compared_and_let_go() {
     for path in ["kept", "difference"] {
         assert!(running.get(&format!("{path}?client=a")).head.contains("image/png"), "{path}");
     }
+    // The second state of the view, compared with the picture that was kept.
+    let kept = running.session.shown().kept.unwrap().number;
+    let difference = running.get("difference?client=a").head;
+    assert!(difference.contains(&format!("organza-pair: {kept}/2\r\n")), "{difference}");
     assert_eq!(post("let-go").status, 200);
     assert_eq!(running.get("difference?client=a").status, 204);
     let accuracy = post("accuracy");
@@ -453,4 +461,174 @@ fn it_ends_a_while_after_its_last_page() {
     let start = Instant::now();
     assert_eq!(running.thread.take().unwrap().join().unwrap(), Ended::PagesClosed);
     assert!((15..40).contains(&start.elapsed().as_secs()), "{:?}", start.elapsed());
+}
+
+/// Most bytes of a file that is handed over here.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Opens points of a file as a scene beside it.
+fn open_points(file: GivenFile) -> Result<Session, Error> {
+    let scene = format!(
+        "version = 1\n[camera]\nauto = true\nsize = [16, 12]\n[[object]]\nname = \"points\"\npoints = {:?}\n",
+        file.name
+    );
+    let opening = Opening {
+        title: file.name.clone(),
+        is_fleeting: true,
+        ..Opening::of_text(file.path.with_extension("toml"), scene, RenderOptions::default())
+    };
+    Session::open(Opening { inputs: vec![file], ..opening }, &Progress::new())
+}
+
+fn start_opening() -> Running {
+    Running::start_with(|server| server.opening(Opener::new(MOST_BYTES, open_points)))
+}
+
+impl Running {
+    fn open(&self, name: &str, body: &str) -> Answer {
+        let headers = format!("{}Content-Type: application/octet-stream\r\n", self.host());
+        self.ask(&format!("POST /{}/open?client=a&name={name}", self.token), &headers, body)
+    }
+}
+
+/// The files of this name that were handed over and are kept.
+fn handed_over(name: &str) -> Vec<PathBuf> {
+    let folders = std::fs::read_dir(std::env::temp_dir()).unwrap().flatten().map(|entry| entry.path());
+    let is_of_view = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().starts_with("organza-view-");
+    folders.filter(is_of_view).map(|folder| folder.join(name)).filter(|file| file.exists()).collect()
+}
+
+const POINTS: &str = "x,y,z,heat\n0,0,0,1\n1,0,0,2\n0,1,0,3\n";
+
+#[test]
+fn a_file_that_is_handed_over_takes_the_place_of_the_view_before() {
+    let mut running = start_opening();
+    running.session.whole_picture().unwrap();
+    let before = running.get("state?client=a").body;
+    assert!(before.contains("\"most_file_bytes\":1048576"), "{before}");
+    for name in ["first%20points.csv", "second.csv"] {
+        let answer = running.open(name, POINTS);
+        let name = name.replace("%20", " ");
+        assert!(answer.status == 200 && answer.body.contains(&format!("\"title\":\"{name}\"")), "{}", answer.body);
+        assert_eq!(handed_over(&name).len(), 1, "{name}");
+    }
+    // What it took the place of is gone, and a scene that is saved names the file alone.
+    assert!(handed_over("first points.csv").is_empty());
+    let end = Instant::now() + Duration::from_secs(30);
+    while running.get("save/picture.png?client=a").status != 200 {
+        assert!(Instant::now() < end, "{}", running.get("state?client=a").body);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let scene = running.get("save/scene?client=a").body;
+    assert!(scene.contains("points = \"second.csv\"") && !scene.contains("organza-view-"), "{scene}");
+    assert_eq!(running.stop(), Ended::Asked);
+    assert!(handed_over("second.csv").is_empty());
+}
+
+#[test]
+fn a_file_that_cannot_be_opened_is_refused_by_its_name_and_the_view_before_goes_on() {
+    let running = start_opening();
+    running.session.whole_picture().unwrap();
+    let broken = running.open("broken.csv", "x,y,z\n0,0,zero\n");
+    assert!(
+        broken.status == 422 && broken.body.contains("\"broken.csv:2:") && !broken.body.contains("organza-view-"),
+        "{}",
+        broken.body
+    );
+    let lacking = running.open(
+        "lacking.nhdr",
+        "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: /etc/hostname\n\n",
+    );
+    assert!(lacking.status == 422, "{}", lacking.body);
+    assert!(handed_over("broken.csv").is_empty() && handed_over("lacking.nhdr").is_empty());
+    assert!(running.session.whole_picture().is_ok() && running.get("state?client=a").body.contains("scene.toml"));
+}
+
+#[test]
+fn files_of_strangers_and_names_that_lead_elsewhere_are_refused() {
+    let running = start_opening();
+    let Running { token, address, .. } = &running;
+    let host = running.host();
+    let kind = "Content-Type: application/octet-stream\r\n";
+    let open = format!("POST /{token}/open?client=a&name=stranger.csv");
+    let evil = format!("{host}Origin: http://evil.example\r\n{kind}");
+    for (line, headers, status) in [
+        (open.as_str(), evil.as_str(), 403),
+        (open.as_str(), &format!("Host: evil.example\r\n{kind}"), 403),
+        ("POST /0123/open?client=a&name=stranger.csv", &format!("{host}{kind}"), 403),
+        (&format!("POST /{token}/open?name=stranger.csv"), &format!("{host}{kind}"), 400),
+        (&format!("GET /{token}/open?client=a&name=stranger.csv"), &format!("{host}{kind}"), 405),
+        (open.as_str(), &format!("{host}Content-Type: text/plain\r\n"), 415),
+        (open.as_str(), host.as_str(), 415),
+    ] {
+        assert_eq!(running.ask(line, headers, POINTS).status, status, "{line}\n{headers}");
+    }
+    for name in [
+        "../stranger.csv",
+        "..%2Fstranger.csv",
+        "%2Ftmp%2Fstranger.csv",
+        "..",
+        "",
+        "stranger.csv%00",
+        "a%5Cstranger.csv",
+    ] {
+        assert_eq!(running.open(name, POINTS).status, 400, "{name}");
+    }
+    assert!(handed_over("stranger.csv").is_empty() && !std::env::temp_dir().join("stranger.csv").exists());
+    // A view without an opener takes none.
+    assert_eq!(Running::start().open("stranger.csv", POINTS).status, 404);
+    assert!(running.get("state?client=a").body.contains("scene.toml"), "{address}");
+}
+
+#[test]
+fn a_file_of_a_gigabyte_ends_and_slow_ones_hold_nobody() {
+    let running = start_opening();
+    let Running { token, address, .. } = &running;
+    running.session.whole_picture().unwrap();
+    let before = memory();
+    let begun = |name: &str, length: &str| {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_write_timeout(Some(Duration::from_secs(12))).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let head = format!(
+            "POST /{token}/open?client=a&name={name} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\
+             Content-Type: application/octet-stream\r\n{length}\r\n\r\n"
+        );
+        stream.write_all(head.as_bytes()).unwrap();
+        stream
+    };
+    let chunk = [&b"10000\r\n"[..], &b" ".repeat(1 << 16), b"\r\n"].concat();
+    for length in ["Content-Length: 1073741824", "Transfer-Encoding: chunked"] {
+        let mut stream = begun("huge.csv", length);
+        let body = if length.starts_with('T') { &chunk[..] } else { &chunk[7..7 + (1 << 16)] };
+        let mut sent = 0u64;
+        while sent < 1 << 30 && stream.write_all(body).is_ok() {
+            sent += 1 << 16;
+        }
+        assert!(sent < 1 << 26, "{length}: {sent} bytes were taken");
+    }
+    assert!(memory().saturating_sub(before) < 64 << 20);
+    // A byte now and then: the next of them does not come in time. Others are answered meanwhile.
+    let mut slow = begun("slow.csv", "Content-Length: 1000");
+    slow.write_all(b"x").unwrap();
+    let end = Instant::now() + Duration::from_secs(4);
+    while handed_over("slow.csv").is_empty() {
+        assert!(Instant::now() < end);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let start = Instant::now();
+    assert_eq!(running.get("state?client=b").status, 200);
+    assert!(start.elapsed() < Duration::from_secs(1));
+    assert_eq!(running.open("other.csv", POINTS).status, 409);
+    let mut answer = String::new();
+    let _ = slow.read_to_string(&mut answer);
+    assert!(answer.starts_with("HTTP/1.1 408"), "{answer}");
+    // One that breaks off leaves nothing either, and makes room for the next.
+    drop(begun("broken-off.csv", "Content-Length: 1000"));
+    let end = Instant::now() + Duration::from_secs(10);
+    while running.open("other.csv", POINTS).status != 200 {
+        assert!(Instant::now() < end, "nobody else opens a file");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(["huge.csv", "slow.csv", "broken-off.csv"].iter().all(|name| handed_over(name).is_empty()));
 }

@@ -9,7 +9,7 @@ pub(crate) mod input;
 mod loading;
 mod media_facts;
 mod mesh_facts;
-mod normalize;
+pub(crate) mod normalize;
 pub(crate) mod object;
 mod object_context;
 pub(crate) mod own;
@@ -94,12 +94,12 @@ impl Loaded {
         self.slice_thickness = scaled_thickness(scene, self.exponent);
     }
 
-    /// A box around all objects and splats, those too that were put aside, world units; empty where there is nothing.
-    pub(crate) fn bounds(&self, aside: Option<&Everything>) -> DAabb {
+    /// A box around each object of the scene and its splats, those too that were put aside, world units; empty where there is nothing.
+    pub(crate) fn object_bounds(&self, aside: Option<&Everything>) -> Vec<DAabb> {
         let cloud = aside.map_or(&self.cloud, |everything| &everything.cloud);
-        let DAabb { min, max } = normalize::bounds(cloud, &self.own);
         let scale = libm::exp2(f64::from(self.exponent));
-        DAabb::new(min * scale, max * scale)
+        let world = |DAabb { min, max }: DAabb| DAabb::new(min * scale, max * scale);
+        normalize::object_bounds(cloud, &self.own, self.objects.len()).into_iter().map(world).collect()
     }
 
     /// Takes the lights from a scene that differs from the loaded one in camera, lights and render settings alone, and what is known of its sources in these lights;

@@ -127,10 +127,10 @@ impl Left {
         }
     }
 
-    /// A box around all that the last frame was made of, cut away or not, world units.
-    pub(crate) fn bounds(&self) -> Option<DAabb> {
-        let Made { loaded, uncut, .. } = self.made.as_ref()?;
-        Some(loaded.bounds(uncut.as_ref().map(|uncut| &uncut.everything)))
+    /// A box around all that the last frame made of each object, cut away or not, world units; empty for an object without anything.
+    pub(crate) fn object_bounds(&self) -> Vec<DAabb> {
+        let Some(Made { loaded, uncut, .. }) = &self.made else { return Vec::new() };
+        loaded.object_bounds(uncut.as_ref().map(|uncut| &uncut.everything))
     }
 
     /// Share of the allowed memory that files may take, and light that is remembered.
@@ -235,7 +235,8 @@ fn drawn_anew(scene: &Scene, before: &[Technique], by: &[Technique]) -> Vec<Stri
     let sentence = |((object, before), by): ((&SceneObject, &Technique), &Technique)| {
         let name = crate::shown(&object.name);
         format!(
-            "object '{name}' is drawn by `{}` from this frame on, by `{}` before: name its technique",
+            "object '{name}' is drawn by the technique `{}` in this picture and by `{}` in the one before, so its look may change: choose one \
+             technique for it",
             by.name(),
             before.name()
         )

@@ -7,7 +7,7 @@ mod small;
 
 use crate::choose::row;
 use crate::form::PlannedObject;
-use crate::load::{Loaded, own::Own};
+use crate::load::{Loaded, normalize::object_bounds, own::Own};
 use crate::plan::{Effect, Plan};
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject, Source};
@@ -289,19 +289,11 @@ fn seen(loaded: &Loaded) -> Vec<bool> {
 
 /// The objects that are not seen and not empty, with their bounds in the normalized world.
 fn bounds(loaded: &Loaded, seen: &[bool]) -> Vec<(usize, DAabb)> {
-    let mut boxes = vec![DAabb::EMPTY; seen.len()];
-    let unseen = |id: usize| !seen[id];
-    if !(0..seen.len()).any(unseen) {
+    if seen.iter().all(|is_seen| *is_seen) {
         return Vec::new();
     }
-    let mut add = |id: usize, b: DAabb| boxes[id] = boxes[id].union(b);
-    loaded.own.iter().filter(|o| unseen(o.object)).for_each(|o| add(o.object, o.world_box()));
-    let cloud = &loaded.cloud;
-    for (object, position) in cloud.object.iter().zip(&cloud.position).filter(|(o, _)| unseen(**o as usize)) {
-        let p = cloud.origin + position.as_dvec3();
-        add(*object as usize, DAabb::new(p, p));
-    }
-    boxes.into_iter().enumerate().filter(|(_, b)| !b.is_empty()).collect()
+    let boxes = object_bounds(&loaded.cloud, &loaded.own, seen.len());
+    boxes.into_iter().enumerate().filter(|(id, b)| !seen[*id] && !b.is_empty()).collect()
 }
 
 /// Lights that are not scattered as often as was asked for.

@@ -96,6 +96,118 @@ fn a_cut_is_added_dragged_in_the_picture_and_removed() {
 }
 
 #[test]
+fn a_cut_of_one_object_goes_through_that_object_alone() {
+    let small = "[[object]]\nname = \"bead\"\nmedium_box = { min = [0.5, 0.5, 0.5], max = [0.7, 0.7, 0.7], extinction = 9, spacing = 0.05 }\n";
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG + small));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.wait_for("shown.objects.every((object) => object.bounds)");
+    page.value("at('cuts-panel').open = true, at('add-cut').click()");
+    page.wait_for("shown.cuts.length === 1");
+    let span = "Number(cutRows[0].slider.max) - Number(cutRows[0].slider.min)";
+    let of_everything = page.value(span).as_f64().unwrap();
+    page.value("(({ object }) => { object.value = 'bead'; object.dispatchEvent(new Event('change')); })(cutRows[0])");
+    page.wait_for("shown.cuts[0].object === 'bead'");
+    let of_bead = page.value(span).as_f64().unwrap();
+    assert!(of_everything > 1.5 && (0.15..0.3).contains(&of_bead), "{of_everything} and {of_bead}");
+    // The plane goes to it, and its outline is as large as it is.
+    assert_eq!(page.value("shown.cuts[0].point[2] > 0.45 && shown.cuts[0].point[2] < 0.75"), true);
+    let height = page.value("at('plane-outline').getBBox().height / pictureHeight()").as_f64().unwrap();
+    assert!(height > 0.0 && height < 0.2, "{height}");
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_number_that_is_refused_gives_way_to_the_last_good_one() {
+    let place = Place::new(SMALL_SCENE);
+    let scene = volume(&place);
+    place.write("s.toml", scene);
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.value("at('cuts-panel').open = true, at('add-cut').click()");
+    page.wait_for("shown.cuts.length === 1");
+    page.wait_for(WHOLE);
+    for (field, typed, said) in [
+        ("at('width')", "", "Width in pixels: expected a number from 1 to 65536, found no number"),
+        ("at('height')", "-4", "Height in pixels: expected a number from 1 to 65536, found -4"),
+        ("at('height')", "60000", "× 60000: the longer side of the image"),
+        ("rows.lights.get('0').elevation", "91", "expected a number from -90 to 90, found 91"),
+        ("cutRows[0].number", "1e30", "found 1e30"),
+        ("rows.objects.get('ramp').curve.extinction.input", "-1", "Extinction: expected a number from 0"),
+        ("rows.objects.get('ramp').curve.value.input", "", "Value: expected a number"),
+    ] {
+        let before = page.value(&format!("{field}.value"));
+        page.value(&format!("{field}.focus(), {field}.value = '{typed}', {field}.dispatchEvent(new Event('change'))"));
+        page.wait_for(&format!("!at('trouble').hidden && at('trouble').textContent.includes('{said}')"));
+        page.wait_for(&format!("{field}.value === '{}'", before.as_str().unwrap()));
+        page.value("add({ do: 'exposure', stops: shown.exposure })");
+        page.wait_for("at('trouble').hidden");
+        page.wait_for(WHOLE);
+    }
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_difference_is_shown_beside_the_picture_that_it_belongs_to() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.value("at('compare-panel').open = true, at('keep').click()");
+    page.wait_for("shown.kept");
+    page.value("add({ do: 'exposure', stops: 1 })");
+    page.wait_for("/RMSE 0[.]/.test(at('compare-text').textContent)");
+    page.value("at('difference').click()");
+    page.wait_for("keptCanvas.dataset.what === 'difference' && !keptCanvas.hidden && differing === pairOf(generation)");
+    // Whenever the picture on the page is another one, the difference is hidden, and the page says so.
+    page.value(
+        "(globalThis.wrong = 0, globalThis.hidden = 0, globalThis.watching = setInterval(() => { \
+           if (!keptCanvas.hidden && differing !== pairOf(generation)) globalThis.wrong += 1; \
+           if (keptCanvas.hidden && !at('difference-text').hidden) globalThis.hidden += 1; }, 1), 0)",
+    );
+    for stops in 2..6 {
+        page.value(&format!("add({{ do: 'exposure', stops: {stops} }})"));
+        page.wait_for(WHOLE);
+        page.wait_for("!keptCanvas.hidden && differing === pairOf(generation)");
+    }
+    assert_eq!(page.value("[globalThis.wrong, globalThis.hidden > 0]"), serde_json::json!([0, true]));
+    ends_well(&page, view);
+}
+
+#[test]
+fn two_pictures_are_shown_side_by_side() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.value("at('compare-panel').open = true, at('keep').click()");
+    page.wait_for("shown.kept && !at('divider').hidden");
+    page.value("at('beside').click()");
+    let side = "((canvas) => { const box = canvas.getBoundingClientRect(); return [box.left / stage.clientWidth, box.width / stage.clientWidth]; })";
+    let half = |page: &mut Page, id: &str| -> Vec<f64> {
+        serde_json::from_value(page.value(&format!("{side}(at('{id}'))"))).unwrap()
+    };
+    assert_eq!((half(&mut page, "picture"), half(&mut page, "kept")), (vec![0.0, 0.5], vec![0.5, 0.5]));
+    assert_eq!(
+        page.value("at('divider').hidden && at('divide').disabled && keptCanvas.style.clipPath === 'none'"),
+        true
+    );
+    // What the view turns around is in the middle of the left half, for the pointer, the cursor and planes.
+    let middle = page.value("onStage(shown.viewpoint.centre)[0] / stage.clientWidth").as_f64().unwrap();
+    assert!((middle - 0.25).abs() < 1e-6, "{middle}");
+    assert_eq!(page.value("pictureBelow({ x: 0.25 * stage.clientWidth, y: 0.5 * stage.clientHeight }).right"), 0.5);
+    assert_eq!(
+        page.value("pictureBelow({ x: 0.75 * stage.clientWidth, y: 0.5 * stage.clientHeight })"),
+        serde_json::Value::Null
+    );
+    page.press("v");
+    assert_eq!(page.value("parseFloat(at('crosshair').style.left) / stage.clientWidth"), 0.25);
+    page.press("v");
+    page.value("at('let-go').click()");
+    page.wait_for("!shown.kept && !stage.classList.contains('beside')");
+    assert_eq!(half(&mut page, "picture"), [0.0, 1.0]);
+    ends_well(&page, view);
+}
+
+#[test]
 fn a_knot_is_moved_by_keys_and_pictures_are_compared() {
     let place = Place::new(SMALL_SCENE);
     let scene = volume(&place);
@@ -135,6 +247,9 @@ fn points_are_coloured_by_a_column_and_drawn_by_another_technique() {
     let mut page = opened(&view);
     let first = page.value(PICTURE);
     page.wait_for("rows.objects.get('cloud').column.options.length > 2");
+    let offered =
+        page.value("[...rows.objects.get('cloud').map.options].map((option) => option.value).filter(Boolean)");
+    assert_eq!(offered, serde_json::json!(organza::scene::color_map_names().collect::<Vec<_>>()));
     let choose = |what: &str, value: &str| {
         format!(
             "(({what}) => {{ {what}.value = '{value}'; {what}.dispatchEvent(new Event('change')); }})(rows.objects.get('cloud').{what})"
@@ -221,12 +336,12 @@ fn the_page_fits_a_screen_and_a_phone_and_is_used_by_keys() {
     let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
     let view = View::start(&place, &["s.toml"]);
     let mut page = opened(&view);
-    for (width, height) in [(1280, 720), (390, 844)] {
-        let size =
-            serde_json::json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 760 });
+    for (width, height) in [(1280, 720), (390, 844), (200, 600)] {
+        // A phone would make its page wider than its screen instead.
+        let size = serde_json::json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         page.call("Emulation.setDeviceMetricsOverride", size);
         page.value("for (const panel of document.querySelectorAll('details')) panel.open = true");
-        assert_eq!(page.value("document.documentElement.scrollWidth <= innerWidth"), true, "{width}");
+        assert_eq!(page.value(&format!("document.documentElement.scrollWidth <= {width}")), true, "{width}");
         // What can be used has a name.
         let nameless = "[...document.querySelectorAll('button, input, select')].filter((control) => control.offsetParent \
                         && !control.labels?.length && !control.getAttribute('aria-label') && !control.textContent.trim()).map((control) => control.outerHTML)";
@@ -252,4 +367,70 @@ fn a_view_ends_after_its_page_was_closed_while_it_draws() {
         assert!(Instant::now() < end, "it goes on");
         std::thread::sleep(Duration::from_millis(100));
     }
+}
+
+#[test]
+fn axes_and_a_scale_bar_are_over_the_picture_and_the_axes_are_looked_along() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let saved = "fetch(`save/picture.png?client=${client}`).then((answer) => answer.arrayBuffer()).then((bytes) => bytes.byteLength)";
+    let bytes = page.value(saved);
+    for (end, eye) in [
+        ("+x", "[1, 0, 0]"),
+        ("−x", "[-1, 0, 0]"),
+        ("+y", "[0, 1, 0]"),
+        ("−y", "[0, -1, 0]"),
+        ("+z", "[0, 0, 1]"),
+        ("−z", "[0, 0, -1]"),
+    ] {
+        page.value(&format!("at('axes').querySelector('[aria-label=\"Look from {end}\"] circle').dispatchEvent(new MouseEvent('click', {{ bubbles: true }}))"));
+        page.wait_for(&format!("{eye}.every((number, k) => Math.abs(number - towardsEye()[k]) < 1e-6)"));
+    }
+    page.press("9");
+    page.wait_for("towardsEye().every((number) => Math.abs(number - Math.sqrt(1 / 3)) < 1e-6)");
+    // As long as it says, at the depth of the centre.
+    let length = "parseFloat(at('scale-text').textContent)";
+    let pixels = "at('scale-bar').getBoundingClientRect().width";
+    assert_eq!(
+        page.value(&format!("Math.abs({pixels} / pictureHeight() * shown.viewpoint.height / {length} - 1) < 0.02")),
+        true
+    );
+    assert_eq!(page.value("at('scale-text').textContent.endsWith('at the centre')"), true);
+    for (key, shown) in [("x", "getComputedStyle(at('axes')).display"), ("b", "getComputedStyle(at('scale')).display")]
+    {
+        page.press(key);
+        assert_eq!(page.value(shown), "none");
+        page.press(key);
+        assert_ne!(page.value(shown), "none");
+    }
+    // What is saved has neither.
+    page.press("r");
+    page.wait_for("Math.abs(shown.viewpoint.azimuth) < 1");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(saved), bytes);
+    ends_well(&page, view);
+}
+
+#[test]
+fn a_file_that_is_dropped_is_opened_and_what_is_none_is_refused() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    let drop = |name: &str, text: &str| {
+        format!(
+            "(() => {{ const dataTransfer = new DataTransfer(); dataTransfer.items.add(new File(['{text}'], '{name}')); \
+             for (const kind of ['dragover', 'drop']) stage.dispatchEvent(new DragEvent(kind, {{ dataTransfer, bubbles: true, cancelable: true }})); }})()"
+        )
+    };
+    page.value(&drop("corner.csv", "x,y,z\\n0,0,zero\\n"));
+    page.wait_for("at('trouble').textContent.startsWith('corner.csv:2:') && at('opening').hidden");
+    page.wait_for(WHOLE);
+    // The browser itself reports the refusal of a request.
+    page.faults.clear();
+    page.value(&drop("corner.csv", "x,y,z\\n0,0,0\\n1,0,0\\n0,1,0\\n"));
+    page.wait_for("shown.title === 'corner.csv' && at('title').textContent === 'corner.csv'");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value("shown.objects.map((object) => object.name)"), serde_json::json!(["corner"]));
+    ends_well(&page, view);
 }

@@ -12,8 +12,17 @@ use convert::{Classified, ColorBy, ColorMap, DiscShape, DiscSize, Kept, MapScale
 const LONGEST_NAME: usize = 256;
 /// Largest diameter of a disc, pixels.
 const MOST_PIXELS: f64 = 1024.0;
+/// The map of the classes of LAS.
+const OF_CLASSES: &str = "classes";
+/// The map of other whole numbers.
+const OF_WHOLE_NUMBERS: &str = "distinct";
 /// Names of the column of classes.
 const CLASSES: [&str; 2] = ["classification", "class"];
+
+/// Names of the maps that colour an object by a column: those of ranges of numbers, then those of whole numbers.
+pub fn color_map_names() -> impl Iterator<Item = &'static str> {
+    ColorMap::names().chain([OF_CLASSES, OF_WHOLE_NUMBERS])
+}
 
 /// Checks an object's keys of points, and of the colours of a mesh; sources that take none of them have the default.
 pub(crate) fn check_points(at: &At<'_>, raw: &RawObject) -> Result<PointsLook, Error> {
@@ -113,21 +122,21 @@ fn check_color_by(at: &At<'_>, raw: &RawObject, by: &RawColorBy) -> Result<Color
         };
         return Ok(ColorBy { column, colors: PointColors::Transfer(check_transfer(at, raw, beside)?, classified) });
     }
-    let default = if CLASSES.contains(&column.as_str()) { "classes" } else { "viridis" };
+    let default = if CLASSES.contains(&column.as_str()) { OF_CLASSES } else { "viridis" };
     let colors = match by.map.as_deref().unwrap_or(default) {
-        name @ ("classes" | "distinct") => {
+        name @ (OF_CLASSES | OF_WHOLE_NUMBERS) => {
             for (key, on) in [("range", range.is_some()), ("scale", by.scale.is_some())] {
                 if on {
                     let message = format!("the map \"{name}\" has a colour for each number and no `{key}`");
                     return Err(at_by.key(key).error(message, "leave it out, or choose another map"));
                 }
             }
-            if name == "classes" { PointColors::Classes } else { PointColors::Distinct }
+            if name == OF_CLASSES { PointColors::Classes } else { PointColors::Distinct }
         }
         name => match ColorMap::named(name) {
             Some(map) => PointColors::Map { map, range, scale: check_scale(&at_by, by.scale, range)? },
             None => {
-                let names: Vec<&str> = ColorMap::names().chain(["classes", "distinct"]).collect();
+                let names: Vec<&str> = color_map_names().collect();
                 let message = format!("`map`: expected one of {}, found `{}`", names.join(", "), shown(name));
                 return Err(at_by.key("map").error(message, "or give the object a `transfer` with colours of its own"));
             }

@@ -20,6 +20,9 @@ function linearOf(hex) {
   });
 }
 
+/// The largest number of single precision, which scenes have for values and extinctions.
+const MOST_NUMBER = 3.4e38;
+
 class Curve {
   /// `take` gets the knots whenever a hand has changed them, and null for those of the scene.
   constructor(name, take) {
@@ -158,7 +161,7 @@ class Curve {
     });
     const knot = this.knots[this.chosen];
     for (const [field, value] of [[this.value, Number(knot.value.toPrecision(6))], [this.extinction, Number(knot.extinction.toPrecision(4))], [this.color, hexOf(knot.color)]]) {
-      if (document.activeElement !== field.input) field.input.value = value;
+      if (!isHeld(field.input)) field.input.value = value;
     }
   }
 
@@ -178,8 +181,9 @@ class Curve {
 
   typed() {
     const knot = this.knots[this.chosen];
-    const [value, extinction] = [Number(this.value.input.value), Number(this.extinction.input.value)];
-    if (this.value.input.value === "" || this.extinction.input.value === "" || !Number.isFinite(value) || !(extinction >= 0)) return;
+    const value = numberIn(this.value.input, -MOST_NUMBER, MOST_NUMBER);
+    const extinction = value === null ? null : numberIn(this.extinction.input, 0, MOST_NUMBER);
+    if (extinction === null) return;
     if (document.activeElement === this.value.input) knot.value = this.between(this.chosen, value);
     if (document.activeElement === this.extinction.input) knot.extinction = extinction;
     if (hexOf(knot.color) !== this.color.input.value) knot.color = linearOf(this.color.input.value);

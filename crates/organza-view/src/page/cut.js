@@ -6,11 +6,11 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const along = (place, direction, length) => place.map((number, k) => number + length * direction[k]);
 const unit = (vector) => vector.map((number) => number / Math.hypot(...vector));
-/// A number to a step that a hand can tell apart in what there is, without the sign of nothing.
-function rounded(number) {
+/// A number to a step that a hand can tell apart in a box, without the sign of nothing.
+function rounded(number, box = shown.bounds) {
   // Before anything was drawn nobody knows how large it is.
-  if (!shown.bounds) return number;
-  const [low, high] = shown.bounds;
+  if (!box) return number;
+  const { low, high } = box;
   const step = 10 ** Math.floor(Math.log10(Math.hypot(...along(high, low, -1)) / 2000));
   if (!(step > 0)) return number;
   return Number((Math.round(number / step) * step).toPrecision(12)) + 0;
@@ -18,6 +18,12 @@ function rounded(number) {
 
 /// As many as the server takes.
 const MOST_CUTS = 32;
+
+/// As far as the server takes them, world units.
+const FARTHEST = 1e18;
+
+/// How much farther than what it cuts a plane goes: splats reach beyond their middles.
+const MARGIN = 0.02;
 
 let cuts = [];
 let chosenCut = 0;
@@ -29,9 +35,16 @@ function setCuts(changed) {
   fillCuts();
 }
 
-/// The middle of everything, and how far it reaches along a direction.
-function reach(normal) {
-  const [low, high] = shown.bounds;
+/// A box around what a cut of this object goes through, with a margin: around the object, or everything.
+function boxOf(name) {
+  const object = shown.objects.find((found) => found.name === name);
+  const { low, high } = (object && object.bounds) || shown.bounds;
+  const margin = MARGIN * Math.hypot(...along(high, low, -1));
+  return { low: low.map((number) => number - margin), high: high.map((number) => number + margin) };
+}
+
+/// The middle of a box, and how far it reaches along a direction.
+function reach({ low, high }, normal) {
   const middle = low.map((number, k) => (number + high[k]) / 2);
   const half = dot(normal.map(Math.abs), low.map((number, k) => (high[k] - number) / 2));
   return { middle, from: dot(middle, normal) - half, to: dot(middle, normal) + half };
@@ -42,8 +55,26 @@ const positionOf = (cut) => dot(unit(cut.normal), cut.point);
 /// The same cut at another position along its normal.
 function moved(cut, position) {
   const normal = unit(cut.normal);
-  const { middle } = reach(normal);
-  return { ...cut, point: along(middle, normal, position - dot(middle, normal)).map(rounded) };
+  const box = boxOf(cut.object);
+  const { middle } = reach(box, normal);
+  const point = along(middle, normal, position - dot(middle, normal));
+  return { ...cut, point: point.map((number) => rounded(number, box)) };
+}
+
+/// The same cut, or the nearest that touches what it cuts.
+function within(cut) {
+  if (!shown.bounds) return cut;
+  const { from, to } = reach(boxOf(cut.object), unit(cut.normal));
+  const position = Math.min(to, Math.max(from, positionOf(cut)));
+  return position === positionOf(cut) ? cut : moved(cut, position);
+}
+
+/// The same cut where it goes through what it cuts, else through the middle of that: beside an object it takes all or nothing.
+function through(cut) {
+  if (!shown.bounds) return cut;
+  const normal = unit(cut.normal);
+  const { middle, from, to } = reach(boxOf(cut.object), normal);
+  return positionOf(cut) > from && positionOf(cut) < to ? cut : moved(cut, dot(middle, normal));
 }
 
 const towardsEye = () => cross(shown.viewpoint.right, shown.viewpoint.up);
@@ -56,13 +87,13 @@ function newCut() {
   const axis = (free.length > 0 ? free : [0, 1, 2]).reduce((best, k) => (Math.abs(eye[k]) > Math.abs(eye[best]) ? k : best));
   const normal = [0, 0, 0];
   normal[axis] = Math.sign(eye[axis]) || 1;
-  return { object: null, normal, point: middleOfView() };
+  return { object: null, normal, point: middleOfView(null) };
 }
 
-/// The place that the view turns around, within what there is.
-function middleOfView() {
-  const [low, high] = shown.bounds;
-  return shown.viewpoint.centre.map((number, k) => rounded(Math.min(high[k], Math.max(low[k], number))));
+/// The place that the view turns around, within what a cut of this object goes through.
+function middleOfView(object) {
+  const box = boxOf(object);
+  return shown.viewpoint.centre.map((number, k) => rounded(Math.min(box.high[k], Math.max(box.low[k], number)), box));
 }
 
 /// The word for a direction; nothing where it is no axis.
@@ -81,14 +112,14 @@ function makeCut(index) {
   const option = (value, textContent) => element("option", { value, textContent });
   const row = {};
   row.object = element("select", { "aria-label": label("Object") }, [option("", "everything"), ...shown.objects.map((object) => option(object.name, object.name))]);
-  row.object.addEventListener("change", () => changeCut(index, (cut) => ({ ...cut, object: row.object.value || null })));
+  row.object.addEventListener("change", () => changeCut(index, (cut) => through({ ...cut, object: row.object.value || null })));
   row.axis = element("select", { "aria-label": label("Direction") }, [
     ...Object.keys(AXES).map((word) => option(word, `along ${word}`)), option("view", "as seen"), element("option", { value: "", textContent: "slanted", hidden: true }),
   ]);
   row.axis.addEventListener("change", () => {
     const normal = AXES[row.axis.value] || towardsEye().map((number) => Number(number.toFixed(4)) + 0);
     const away = dot(normal, towardsEye()) < 0 ? -1 : 1;
-    changeCut(index, (cut) => ({ ...cut, normal: normal.map((number) => away * number + 0), point: middleOfView() }));
+    changeCut(index, (cut) => ({ ...cut, normal: normal.map((number) => away * number + 0), point: middleOfView(cut.object) }));
   });
   const button = (text, title, act) => {
     const made = element("button", { type: "button", textContent: text, title, "aria-label": label(title) });
@@ -105,8 +136,9 @@ function makeCut(index) {
   row.slider.addEventListener("input", () => changeCut(index, (cut) => moved(cut, signOf(cut) * Number(row.slider.value))));
   row.number = element("input", { type: "number", step: "any", "aria-label": label("Position, world units,") });
   row.number.addEventListener("change", () => {
-    const number = Number(row.number.value);
-    if (row.number.value !== "" && Math.abs(number) <= 1e18) changeCut(index, (cut) => moved(cut, signOf(cut) * number));
+    const number = numberIn(row.number, -FARTHEST, FARTHEST);
+    if (number === null) return;
+    changeCut(index, (cut) => moved(cut, signOf(cut) * number));
     row.number.blur();
     fillCuts();
   });
@@ -130,17 +162,16 @@ function fillCuts() {
   cuts.forEach((cut, index) => {
     const row = cutRows[index];
     row.number.disabled = row.slider.disabled = row.axis.disabled = !shown.bounds;
-    const isHeld = (input) => document.activeElement === input;
     const normal = unit(cut.normal).map((number) => signOf(cut) * number);
     row.object.value = cut.object || "";
     if (!isHeld(row.axis)) row.axis.value = axisOf(cut.normal);
     if (shown.bounds) {
-      const { from, to } = reach(normal);
+      const { from, to } = reach(boxOf(cut.object), normal);
       Object.assign(row.slider, { min: from, max: to, step: (to - from) / 400 || "any" });
     }
     const position = dot(normal, cut.point);
     if (!isHeld(row.slider)) row.slider.value = position;
-    if (!isHeld(row.number)) row.number.value = rounded(position);
+    if (!isHeld(row.number)) row.number.value = shown.bounds ? rounded(position, boxOf(cut.object)) : position;
   });
   at("add-cut").disabled = !shown.bounds || cuts.length >= MOST_CUTS;
   placePlane();
@@ -160,15 +191,16 @@ function onStage(place) {
   const from = place.map((number, k) => number - eye.centre[k]);
   const depth = eye.distance - dot(from, towardsEye());
   if (!eye.is_parallel && depth <= 1e-3 * eye.distance) return null;
-  const scale = ((eye.is_parallel ? 1 : eye.distance / depth) * pictureHeight()) / eye.height;
-  return [stage.clientWidth / 2 + scale * dot(from, eye.right), stage.clientHeight / 2 - scale * dot(from, eye.up)];
+  const box = pictureBox();
+  const scale = ((eye.is_parallel ? 1 : eye.distance / depth) * box.height) / eye.height;
+  return [box.left + box.width / 2 + scale * dot(from, eye.right), box.top + box.height / 2 - scale * dot(from, eye.up)];
 }
 
-/// The corners of a plane in the box of everything, around its middle.
+/// The corners of a plane in the box of what it cuts, around its middle.
 function outline(cut) {
-  const [low, high] = shown.bounds;
+  const { low, high } = boxOf(cut.object);
   const normal = unit(cut.normal);
-  const { from, to } = reach(normal);
+  const { from, to } = reach({ low, high }, normal);
   // At its ends a plane only touches what there is.
   const inset = 1e-6 * (to - from);
   const position = Math.min(to - inset, Math.max(from + inset, dot(normal, cut.point)));
@@ -194,7 +226,7 @@ function handleOf(cut) {
   const places = outline(cut);
   if (places.length < 3) return null;
   const middle = places.reduce((sum, place) => along(sum, place, 1 / places.length), [0, 0, 0]);
-  const [low, high] = shown.bounds;
+  const { low, high } = boxOf(cut.object);
   const step = Math.hypot(...along(high, low, -1)) / 100;
   const [here, there] = [onStage(middle), onStage(along(middle, unit(cut.normal), step))];
   if (!here || !there) return null;
@@ -235,10 +267,7 @@ at("plane-handle").addEventListener("pointermove", (event) => {
   const isSeen = Math.hypot(...way) > 0.15 * pixels;
   const towards = dot(unit(cuts[chosenCut].normal), towardsEye()) < 0 ? -1 : 1;
   const distance = isSeen ? (drag[0] * way[0] + drag[1] * way[1]) / (way[0] ** 2 + way[1] ** 2) : (towards * drag[1]) / pixels;
-  changeCut(chosenCut, (cut) => {
-    const { from, to } = reach(unit(cut.normal));
-    return moved(cut, Math.min(to, Math.max(from, heldCut.position + distance)));
-  });
+  changeCut(chosenCut, (cut) => within(moved(cut, heldCut.position + distance)));
 });
 for (const end of ["pointerup", "pointercancel"]) {
   at("plane-handle").addEventListener(end, (event) => {

@@ -86,7 +86,9 @@ at("accuracy-reset").addEventListener("click", () => add({ do: "accuracy", step:
 
 const keptCanvas = at("kept");
 let kept = null;
+/// The kept picture and the state that were compared last, and those that the difference on the page belongs to.
 let compared = "";
+let differing = "";
 let comparing = false;
 
 async function keep() {
@@ -95,6 +97,12 @@ async function keep() {
 }
 
 function showCompare(found) {
+  keepUp(found);
+  arrange();
+}
+
+/// Follows the kept picture, and compares it with a new one.
+function keepUp(found) {
   at("keep").disabled = !found.is_whole;
   at("let-go").hidden = at("compare").hidden = !found.kept;
   const number = found.kept ? found.kept.number : null;
@@ -106,11 +114,14 @@ function showCompare(found) {
     if (kept !== null) showOver("kept");
   }
   if (!found.kept) return;
-  const key = `${kept}/${found.generation}`;
+  const key = pairOf(found.generation);
   if (key !== compared) at("compare-text").textContent = `${keptText(found.kept)}. Compared once the present picture is whole.`;
   if (found.is_whole && key !== compared && !comparing) compare(found.kept, key);
   placeDivider();
 }
+
+/// The kept picture and a state, in a word.
+const pairOf = (state) => `${kept}/${state}`;
 
 function keptText(row) {
   const position = row.step === 0 ? "" : `, ${POSITIONS[row.step]}`;
@@ -132,14 +143,14 @@ async function compare(row, key) {
       at("difference").disabled = !isCompared;
       at("gain").textContent = isCompared ? `shown ${found.gain} times as large` : "";
       if (!isCompared) at("difference").checked = false;
-      if (at("difference").checked || keptCanvas.dataset.what === "difference") showOver(at("difference").checked ? "difference" : "kept");
+      if (at("difference").checked || keptCanvas.dataset.what === "difference") await showOver(at("difference").checked ? "difference" : "kept");
     }
   } catch {
     lost();
   }
   comparing = false;
   // The scene may have changed meanwhile.
-  if (shown && shown.kept && shown.is_whole && `${kept}/${shown.generation}` !== key) showCompare(shown);
+  if (shown && shown.kept && shown.is_whole && pairOf(shown.generation) !== key) showCompare(shown);
 }
 
 /// Shows the kept picture, or the difference, over the present one.
@@ -152,6 +163,7 @@ async function showOver(what) {
     keptCanvas.height = image.height;
     keptCanvas.getContext("2d").drawImage(image, 0, 0);
     keptCanvas.dataset.what = what;
+    differing = answer.headers.get("organza-pair");
     image.close();
     placeDivider();
   } catch {
@@ -163,17 +175,40 @@ async function showOver(what) {
 function placeDivider() {
   if (kept === null) return;
   const isDifference = keptCanvas.dataset.what === "difference";
-  const width = shown ? (pictureHeight() * shown.size.width) / shown.size.height : stage.clientWidth;
-  const left = (stage.clientWidth - width) / 2 + width * (1 - Number(at("divide").value) / 100);
-  at("divider").hidden = isDifference;
-  at("divider").style.left = `${left}px`;
-  keptCanvas.style.clipPath = isDifference ? "none" : `inset(0 0 0 ${left}px)`;
+  // The picture may have changed since.
+  const isOfPair = !isDifference || (differing === pairOf(generation) && at("coarse").hidden);
+  keptCanvas.hidden = !isOfPair;
+  at("difference-text").hidden = isOfPair;
+  const { left, width } = pictureBox();
+  const place = left + width * (1 - Number(at("divide").value) / 100);
+  const isDivided = !isDifference && !isBeside();
+  at("divider").hidden = !isDivided;
+  at("divide").disabled = !isDivided;
+  at("divider").style.left = `${place}px`;
+  keptCanvas.style.clipPath = isDivided ? `inset(0 0 0 ${place}px)` : "none";
+  at("beside-kept").textContent = isDifference ? "difference" : "kept";
 }
+
+/// Whether the present picture has the left half of the stage, and the kept one or the difference the right half.
+const isBeside = () => kept !== null && at("beside").checked;
+
+/// Places what lies on the stage anew where the picture has moved on it.
+function arrange() {
+  if (stage.classList.toggle("beside", isBeside()) === wasBeside) return;
+  wasBeside = isBeside();
+  if (shown) show(shown, true);
+  if (cursor) placeCursor();
+}
+let wasBeside = false;
 
 at("keep").addEventListener("click", keep);
 at("let-go").addEventListener("click", () => ask("let-go"));
 at("divide").addEventListener("input", placeDivider);
 at("difference").addEventListener("change", () => showOver(at("difference").checked ? "difference" : "kept"));
+at("beside").addEventListener("change", () => {
+  arrange();
+  placeDivider();
+});
 window.addEventListener("resize", placeDivider);
 at("divider").addEventListener("pointerdown", (event) => {
   at("divider").setPointerCapture(event.pointerId);
@@ -183,8 +218,8 @@ at("divider").addEventListener("pointermove", (event) => {
   if (!(event.buttons & 1)) return;
   event.stopPropagation();
   const box = stage.getBoundingClientRect();
-  const width = shown ? (pictureHeight() * shown.size.width) / shown.size.height : box.width;
-  const share = 0.5 + (event.clientX - box.left - box.width / 2) / width;
+  const { left, width } = pictureBox();
+  const share = (event.clientX - box.left - left) / width;
   at("divide").value = Math.round(100 * (1 - Math.min(1, Math.max(0, share))));
   placeDivider();
 });
@@ -246,7 +281,7 @@ async function lookOnce(place, isSaid) {
 function belowText(below) {
   const words = [];
   if (below.object !== null) words.push(below.object);
-  if (below.position) words.push(`at ${below.position.map(rounded).join(", ")}`, `depth ${short(below.depth)}`);
+  if (below.position) words.push(`at ${below.position.map((number) => rounded(number)).join(", ")}`, `depth ${short(below.depth)}`);
   else words.push("nothing that hides what lies behind it");
   for (const { name, value, meaning } of below.values) words.push(`${name} ${short(value)}${meaning ? ` ${meaning}` : ""}`);
   if (below.numbers.length > 0) {
@@ -281,10 +316,9 @@ function toggleCursor() {
 }
 
 function placeCursor() {
-  const height = pictureHeight();
-  const width = shown ? (height * shown.size.width) / shown.size.height : stage.clientWidth;
-  at("crosshair").style.left = `${stage.clientWidth / 2 + (cursor.right - 0.5) * width}px`;
-  at("crosshair").style.top = `${stage.clientHeight / 2 + (cursor.down - 0.5) * height}px`;
+  const box = pictureBox();
+  at("crosshair").style.left = `${box.left + cursor.right * box.width}px`;
+  at("crosshair").style.top = `${box.top + cursor.down * box.height}px`;
   lookBelow(cursor, true);
 }
 

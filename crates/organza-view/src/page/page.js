@@ -15,6 +15,8 @@ let isOpen = true;
 
 let waiting = [];
 let isSending = false;
+/// What the page says once they are taken.
+let afterwards = "";
 
 function add(event) {
   const last = waiting[waiting.length - 1];
@@ -36,18 +38,22 @@ async function send() {
   if (isSending || waiting.length === 0) return;
   isSending = true;
   const events = waiting;
+  const said = afterwards;
   waiting = [];
+  afterwards = "";
   try {
     const answer = await fetch(`events?client=${client}`, {
       method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(events),
     });
     const found = await answer.json();
     if (answer.ok) {
-      trouble("");
+      trouble(said);
       show(found);
+      // A size that came back by itself is for its fields, too.
+      if (said) showAgain();
     } else {
       trouble(sentence(found));
-      if (shown) show(shown, true);
+      showAgain();
     }
   } catch {
     lost();
@@ -133,6 +139,12 @@ function showMark(found) {
 // ---- what the page shows ----
 
 function show(found, isAgain = false) {
+  if (shown && found.session !== shown.session) {
+    // Another scene is open: nothing of this one holds.
+    isOpen = false;
+    location.replace(location.pathname);
+    return;
+  }
   if (shown && found.version < shown.version && !isAgain) return;
   shown = found;
   document.title = `${found.title} · Organza`;
@@ -145,15 +157,18 @@ function show(found, isAgain = false) {
   showEffects(found.effects);
   showAccuracy(found);
   showCompare(found);
-  if (document.activeElement !== at("technique")) at("technique").value = found.technique || "";
+  showOverlay(found);
+  checkSize(found);
+  if (!isHeld(at("technique"))) at("technique").value = found.technique || "";
   if (found.picture && found.picture.level === "whole") showPasses(found.picture.passes);
   if (found.picture) showLegends(found.picture.legends);
-  if (document.activeElement !== at("layer")) at("layer").value = found.layer || "";
-  if (document.activeElement !== at("exposure")) at("exposure").value = found.exposure;
+  if (!isHeld(at("layer"))) at("layer").value = found.layer || "";
+  if (!isHeld(at("exposure"))) at("exposure").value = found.exposure;
   at("exposure-value").textContent = `${found.exposure > 0 ? "+" : ""}${found.exposure} EV`;
   for (const side of ["width", "height"]) {
-    if (document.activeElement !== at(side)) at(side).value = found.size[side];
+    if (!isHeld(at(side))) at(side).value = found.size[side];
   }
+  at("open").hidden = found.most_file_bytes === null;
   stage.style.setProperty("--aspect", `${found.size.width} / ${found.size.height}`);
   for (const id of ["save-png", "save-exr"]) at(id).disabled = !found.is_whole;
 }
@@ -201,6 +216,28 @@ function showWarnings(warnings) {
   box.querySelector("ul").replaceChildren(...warnings.map((warning) => element("li", { textContent: warning })));
 }
 
+/// What a hand holds is newer than what comes back, unless it was refused.
+let isRefused = false;
+const isHeld = (input) => document.activeElement === input && !isRefused;
+
+/// Something was refused: fields show again what holds.
+function showAgain() {
+  if (!shown) return;
+  isRefused = true;
+  show(shown, true);
+  isRefused = false;
+}
+
+/// The number in a field. Where it is none from `least` to `most`, the page says so, the field shows the last good number again, and there is nothing.
+function numberIn(input, least, most) {
+  const number = Number(input.value);
+  if (input.value !== "" && number >= least && number <= most) return number;
+  const label = input.getAttribute("aria-label") || input.labels[0].textContent;
+  trouble(`${label}: expected a number from ${least} to ${most}, found ${input.value || "no number"}. The last good number is back.`);
+  showAgain();
+  return null;
+}
+
 function element(name, values = {}, children = []) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(values)) {
@@ -238,17 +275,17 @@ function showObjects(objects) {
   rowsOf("objects", objects, makeObject, (row, object) => {
     row.visible.checked = object.visible;
     if (row.opacity) {
-      if (document.activeElement !== row.opacity || !isSending) row.opacity.value = object.opacity;
+      if (!isHeld(row.opacity) || !isSending) row.opacity.value = object.opacity;
       row.value.textContent = object.opacity.toFixed(2);
       row.opacity.disabled = !object.visible;
     }
     if (row.color) {
       row.color.classList.toggle("unset", object.color === null);
-      if (document.activeElement !== row.color) row.color.value = hexOf(object.color || [0.6, 0.6, 0.6]);
+      if (!isHeld(row.color)) row.color.value = hexOf(object.color || [0.6, 0.6, 0.6]);
       row.uncolored.hidden = !object.is_recolored;
     }
     showColumns(row, object);
-    if (document.activeElement !== row.technique) row.technique.value = object.technique || "";
+    if (!isHeld(row.technique)) row.technique.value = object.technique || "";
     if (row.curve) row.curve.show(object.curve);
   });
 }
@@ -260,12 +297,10 @@ function showColumns(row, object) {
     row.columns = object.columns.join("\n");
     row.column.replaceChildren(element("option", { value: "", textContent: "as in the scene" }), ...object.columns.map((name) => element("option", { value: name, textContent: name })));
   }
-  if (document.activeElement !== row.column) row.column.value = object.color_by || "";
-  if (document.activeElement !== row.map) row.map.value = object.map || "";
+  if (!isHeld(row.column)) row.column.value = object.color_by || "";
+  if (!isHeld(row.map)) row.map.value = object.map || "";
   row.map.hidden = object.color_by === null;
 }
-
-const MAPS = ["viridis", "magma", "inferno", "plasma", "cividis", "turbo", "grey", "coolwarm", "distinct"];
 
 function choice(label, options) {
   return element("select", { "aria-label": label }, options.map(([value, textContent]) => element("option", { value, textContent })));
@@ -298,7 +333,7 @@ function makeObject(object) {
     children.push(element("span", { className: "color" }, [element("span", { textContent: "Colour" }), row.color, row.uncolored]));
   }
   row.column = choice(`Column that colours ${object.name}`, []);
-  row.map = choice(`Map of the colours of ${object.name}`, [["", "map that suits"], ...MAPS.map((map) => [map, map])]);
+  row.map = choice(`Map of the colours of ${object.name}`, [["", "map that suits"], ...shown.maps.map((map) => [map, map])]);
   const colorBy = () => add({ do: "color_by", object: object.name, column: row.column.value || null, map: row.map.value || null });
   row.column.addEventListener("change", colorBy);
   row.map.addEventListener("change", colorBy);
@@ -317,7 +352,6 @@ function makeObject(object) {
 function showLights(lights) {
   at("lights-panel").hidden = lights.length === 0;
   rowsOf("lights", lights, makeLight, (row, light) => {
-    const isHeld = (input) => document.activeElement === input;
     row.shadow.checked = light.shadow;
     if (!isHeld(row.stops)) row.stops.value = light.stops;
     row.value.textContent = `${light.stops > 0 ? "+" : ""}${Number(light.stops.toFixed(2))} EV`;
@@ -328,6 +362,10 @@ function showLights(lights) {
     row.ball.show(light.direction);
   });
 }
+
+/// As the server takes them, degrees.
+const MOST_AZIMUTH = 360;
+const MOST_ELEVATION = 90;
 
 function makeLight(light) {
   const row = {};
@@ -345,16 +383,17 @@ function makeLight(light) {
   ];
   if (light.direction) {
     const turn = () => {
-      const [azimuth, elevation] = [Number(row.azimuth.value), Number(row.elevation.value)];
-      if (Math.abs(azimuth) <= 360 && Math.abs(elevation) <= 90) add({ do: "light_direction", light: light.name, azimuth, elevation });
+      const azimuth = numberIn(row.azimuth, -MOST_AZIMUTH, MOST_AZIMUTH);
+      const elevation = azimuth === null ? null : numberIn(row.elevation, -MOST_ELEVATION, MOST_ELEVATION);
+      if (elevation !== null) add({ do: "light_direction", light: light.name, azimuth, elevation });
     };
     const number = (label, most) => {
       const input = element("input", { type: "number", min: -most, max: most, step: 1, "aria-label": `${label} of light ${light.name}, degrees` });
       input.addEventListener("change", turn);
       return input;
     };
-    row.azimuth = number("Azimuth", 180);
-    row.elevation = number("Elevation", 90);
+    row.azimuth = number("Azimuth", MOST_AZIMUTH);
+    row.elevation = number("Elevation", MOST_ELEVATION);
     row.ball = new Ball((direction) => {
       row.azimuth.value = Math.round(direction.azimuth);
       row.elevation.value = Math.round(direction.elevation);
@@ -473,14 +512,21 @@ function showEffects(effects) {
     const isDrawn = effect.called_for && !effect.lacking;
     row.state.textContent = effect.fixed || (effect.lacking ? "lacking" : isDrawn ? "simulated" : "left out");
     row.cost.textContent = costText(effect);
+    row.cost.title = costTitle(effect);
     for (const [word, input] of Object.entries(row.inputs)) input.checked = effect.switch === word;
   }, order);
 }
 
 function costText(effect) {
   if (effect.predicted_ms === null && effect.measured_ms === null) return "";
-  const measured = effect.measured_ms === null ? "kept" : `${milliseconds(effect.measured_ms)} ms`;
+  const share = effect.sharing > 1 ? "even share: " : "";
+  const measured = effect.measured_ms === null ? "kept" : `${share}${milliseconds(effect.measured_ms)} ms`;
   return effect.predicted_ms === null ? measured : `${measured} (${milliseconds(effect.predicted_ms)})`;
+}
+
+function costTitle(effect) {
+  const text = "Measured time of its passes in the last whole picture, and the predicted one";
+  return effect.sharing > 1 ? `${text}. The passes of ${effect.sharing} effects are measured together, and their time is shared evenly` : text;
 }
 
 function boundText(bound) {
@@ -496,7 +542,7 @@ function makeEffect(effect) {
   row.bound = element("span", { className: "bound" });
   row.why = element("summary");
   row.state = element("span", { className: "state" });
-  row.cost = element("span", { className: "cost", title: "Measured time of its passes in the last whole picture, and the predicted one" });
+  row.cost = element("span", { className: "cost" });
   const group = `effect-${(rank += 1)}`;
   const switches = effect.fixed ? [] : ["auto", "on", "off"].map((word) => {
     const input = element("input", { type: "radio", name: group, value: word });
@@ -516,11 +562,17 @@ function makeEffect(effect) {
 
 // ---- the pointer ----
 
-/// Height of the picture in the stage, CSS pixels: shares of it are what events are in.
-function pictureHeight() {
+/// Where the present picture is on the stage, CSS pixels: as large as there is room, in the left half beside the kept one.
+function pictureBox() {
   const aspect = shown ? shown.size.width / shown.size.height : 16 / 9;
-  return Math.min(stage.clientHeight, stage.clientWidth / aspect) || 1;
+  const room = isBeside() ? stage.clientWidth / 2 : stage.clientWidth;
+  const height = Math.min(stage.clientHeight, room / aspect) || 1;
+  const width = height * aspect;
+  return { left: (room - width) / 2, top: (stage.clientHeight - height) / 2, width, height };
 }
+
+/// Shares of it are what events are in.
+const pictureHeight = () => pictureBox().height;
 
 const pointers = new Map();
 let span = null;
@@ -564,12 +616,11 @@ let pointer = null;
 stage.addEventListener("pointermove", (event) => (pointer = { x: event.clientX, y: event.clientY }));
 stage.addEventListener("pointerleave", () => (pointer = null));
 function pictureBelow(place) {
-  const box = stage.getBoundingClientRect();
-  const height = pictureHeight();
-  const width = shown ? (height * shown.size.width) / shown.size.height : box.width;
   if (!place) return { right: 0.5, down: 0.5 };
-  const right = 0.5 + (place.x - box.left - box.width / 2) / width;
-  const down = 0.5 + (place.y - box.top - box.height / 2) / height;
+  const corner = stage.getBoundingClientRect();
+  const box = pictureBox();
+  const right = (place.x - corner.left - box.left) / box.width;
+  const down = (place.y - corner.top - box.top) / box.height;
   const isInside = right >= 0 && right <= 1 && down >= 0 && down <= 1;
   return isInside ? { right, down } : null;
 }
@@ -596,6 +647,8 @@ stage.addEventListener("wheel", (event) => {
 
 // ---- keys ----
 
+/// Elevation of an eye that sees three axes alike, degrees.
+const CORNER = (Math.atan(Math.SQRT1_2) * 180) / Math.PI;
 const look = (azimuth, elevation) => add({ do: "look_from", azimuth, elevation });
 const keys = {
   "+": () => add({ do: "zoom", steps: 1 }),
@@ -604,6 +657,9 @@ const keys = {
   "1": () => look(0, 0),
   "3": () => look(90, 0),
   "7": () => look(0, 90),
+  "9": () => look(45, CORNER),
+  x: () => toggleOverlay("axes-shown"),
+  b: () => toggleOverlay("scale-shown"),
   c: () => centre(pointer),
   v: () => toggleCursor(),
   k: () => keep(),
@@ -642,12 +698,35 @@ at("technique").addEventListener("change", () => add({ do: "technique", techniqu
 at("layer").addEventListener("change", () => add({ do: "layer", layer: at("layer").value || null }));
 at("exposure").addEventListener("input", () => add({ do: "exposure", stops: Number(at("exposure").value) }));
 
+/// As scenes take it, pixels.
+const LONGEST_SIDE = 65536;
+
+/// The size of the last whole picture, and whether another one was asked for since.
+let goodSize = null;
+let isResized = false;
+
 function setSize(width, height) {
-  if (width >= 1 && height >= 1) add({ do: "size", width: Math.round(width), height: Math.round(height) });
-  else if (shown) for (const side of ["width", "height"]) at(side).value = shown.size[side];
+  if (width === null || height === null) return;
+  isResized = true;
+  add({ do: "size", width: Math.round(width), height: Math.round(height) });
+}
+
+/// A size that no picture can be drawn in gives way to the last that had one.
+function checkSize(found) {
+  if (found.is_whole) {
+    goodSize = found.size;
+    isResized = false;
+  }
+  if (!isResized || !found.failure || !goodSize) return;
+  isResized = false;
+  afterwards = `${found.size.width} × ${found.size.height}: ${sentence(found.failure)} The last good size is back.`;
+  add({ do: "size", ...goodSize });
 }
 for (const side of ["width", "height"]) {
-  at(side).addEventListener("change", () => setSize(Number(at("width").value), Number(at("height").value)));
+  at(side).addEventListener("change", () => {
+    const width = numberIn(at("width"), 1, LONGEST_SIDE);
+    setSize(width, width === null ? null : numberIn(at("height"), 1, LONGEST_SIDE));
+  });
 }
 // A pixel of the picture is one of the screen.
 at("fill").addEventListener("click", () => setSize(stage.clientWidth * devicePixelRatio, stage.clientHeight * devicePixelRatio));

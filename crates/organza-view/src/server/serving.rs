@@ -3,13 +3,14 @@
 use super::Framing;
 use super::clients::{Admission, Clients, MOST_CLIENTS};
 use super::token::Token;
+use super::upload::{Opener, Received, check_size, file_name, receive};
 use crate::accuracy::compare::Comparison;
 use crate::depths::PicturePlace;
 use crate::event::Event;
-use crate::session::Session;
+use crate::session::{Session, Shown};
 use crate::wording::{self, Said};
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
-use hyper::body::{Bytes, Incoming};
+use hyper::body::{Body, Bytes, Incoming};
 use hyper::header::{self, HeaderMap, HeaderName, HeaderValue};
 use hyper::{Method, Request, Response, StatusCode};
 use organza::Error;
@@ -17,8 +18,10 @@ use organza::output::Format;
 use serde::Serialize;
 use serde_json::json;
 use std::net::{IpAddr, SocketAddr};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use tokio::sync::Semaphore;
 use tokio::time::timeout;
 
 /// Most bytes of a request's body: events of a drag are a few hundred.
@@ -45,16 +48,62 @@ const SCRIPT: &str = include_str!("../page/page.js");
 const CURVE: &str = include_str!("../page/curve.js");
 const CUT: &str = include_str!("../page/cut.js");
 const JUDGE: &str = include_str!("../page/judge.js");
+const OVERLAY: &str = include_str!("../page/overlay.js");
+const OPEN: &str = include_str!("../page/open.js");
 const SAVE: &str = include_str!("../page/save.js");
 const STYLE: &str = include_str!("../page/page.css");
 
 /// The state behind all responses.
 pub(crate) struct Counter {
-    pub(crate) session: Arc<Session>,
+    pub(crate) current: Mutex<Current>,
     pub(crate) clients: Mutex<Clients>,
     pub(crate) token: Token,
     pub(crate) address: SocketAddr,
     pub(crate) framing: Framing,
+    pub(crate) opener: Option<Opener>,
+    /// Of whoever opens a file: one at a time.
+    pub(crate) turn: Semaphore,
+}
+
+impl Counter {
+    pub(crate) fn current(&self) -> MutexGuard<'_, Current> {
+        // It is changed by single statements.
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn session(&self) -> Arc<Session> {
+        Arc::clone(&self.current().session)
+    }
+}
+
+/// The session that pages see, and the folders of files that they handed over, which are removed when these are dropped.
+pub(crate) struct Current {
+    session: Arc<Session>,
+    folder: Option<TempDir>,
+    /// Of a file that is being opened.
+    next: Option<TempDir>,
+}
+
+impl Current {
+    pub(crate) const fn new(session: Arc<Session>) -> Self {
+        Self { session, folder: None, next: None }
+    }
+
+    /// Ends the session, and removes what pages handed over.
+    pub(crate) fn end(&mut self) {
+        self.session.close();
+        self.folder = None;
+        self.next = None;
+    }
+}
+
+/// The state as pages get it.
+#[derive(Serialize)]
+struct Told<'s> {
+    #[serde(flatten)]
+    shown: &'s Shown,
+    /// Most bytes of a file that a page may hand over; `None` where the view opens none.
+    most_file_bytes: Option<u64>,
 }
 
 type Answer = Response<Full<Bytes>>;
@@ -77,14 +126,14 @@ pub(crate) async fn answer(counter: &Arc<Counter>, request: Request<Incoming>) -
 }
 
 /// Why a request is not answered.
-struct Refusal {
+pub(super) struct Refusal {
     status: StatusCode,
     message: String,
     hint: String,
 }
 
 impl Refusal {
-    fn new(status: StatusCode, message: &str) -> Self {
+    pub(super) fn new(status: StatusCode, message: &str) -> Self {
         Self { status, message: message.to_owned(), hint: String::new() }
     }
 
@@ -129,6 +178,7 @@ enum Route<'p> {
     Comparison,
     Difference,
     Leave,
+    Open,
     Save(&'p str),
 }
 
@@ -140,6 +190,8 @@ impl<'p> Route<'p> {
             "curve.js" => Self::Script(CURVE),
             "cut.js" => Self::Script(CUT),
             "judge.js" => Self::Script(JUDGE),
+            "overlay.js" => Self::Script(OVERLAY),
+            "open.js" => Self::Script(OPEN),
             "save.js" => Self::Script(SAVE),
             "page.css" => Self::Style,
             "state" => Self::State,
@@ -154,6 +206,7 @@ impl<'p> Route<'p> {
             "comparison" => Self::Comparison,
             "difference" => Self::Difference,
             "leave" => Self::Leave,
+            "open" => Self::Open,
             "save/picture.png" | "save/picture.exr" | "save/scene" => Self::Save(path.strip_prefix("save/")?),
             _ => return None,
         })
@@ -161,7 +214,8 @@ impl<'p> Route<'p> {
 
     const fn method(&self) -> Method {
         match self {
-            Self::Events | Self::Centre | Self::Accuracy | Self::Keep | Self::LetGo | Self::Leave => Method::POST,
+            Self::Events | Self::Centre | Self::Accuracy | Self::Keep | Self::LetGo => Method::POST,
+            Self::Leave | Self::Open => Method::POST,
             _ => Method::GET,
         }
     }
@@ -192,40 +246,41 @@ async fn answered(counter: &Arc<Counter>, request: Request<Incoming>) -> Result<
         return Ok(Response::new(Full::default()));
     }
     admit(counter, name)?;
+    let session = counter.session();
     let answer = match route {
-        Route::State => state(&counter.session, query.number("after")?).await,
-        Route::Picture => picture(&counter.session, query.number("after")?).await,
-        Route::Events => events(&counter.session, request).await,
-        Route::Centre => centre(&counter.session, query.place()?).await,
-        Route::Below => below(&counter.session, query.place()?).await,
+        Route::State => state(counter, &session, query.number("after")?).await,
+        Route::Picture => picture(&session, query.number("after")?).await,
+        Route::Events => events(counter, &session, request).await,
+        Route::Centre => centre(counter, &session, query.place()?).await,
+        Route::Below => below(&session, query.place()?).await,
+        Route::Open => open(counter, query.value("name").unwrap_or(""), request).await,
         Route::Accuracy => {
-            counter.session.ask_for_accuracy();
-            Ok(of_type("application/json", shown(&counter.session)?))
+            session.ask_for_accuracy();
+            Ok(of_type("application/json", shown(counter, &session)?))
         }
         Route::Keep => {
             let message = "the whole picture is not drawn yet; keep it when it is";
             let refused = || Refusal::new(StatusCode::SERVICE_UNAVAILABLE, message);
-            counter.session.keep().then_some(()).ok_or_else(refused)?;
-            Ok(of_type("application/json", shown(&counter.session)?))
+            session.keep().then_some(()).ok_or_else(refused)?;
+            Ok(of_type("application/json", shown(counter, &session)?))
         }
         Route::LetGo => {
-            counter.session.let_go();
-            Ok(of_type("application/json", shown(&counter.session)?))
+            session.let_go();
+            Ok(of_type("application/json", shown(counter, &session)?))
         }
         Route::Kept => {
-            let kept = counter.session.kept_picture();
+            let kept = session.kept_picture();
             Ok(kept.map_or_else(nothing, |kept| of_type("image/png", kept.png.clone())))
         }
         Route::Comparison => {
-            let found = comparison(&counter.session).await?;
+            let found = comparison(&session).await?;
             found.map_or_else(|| Ok(nothing()), |found| Ok(of_type("application/json", json_of(&*found)?)))
         }
         Route::Difference => {
-            let found = comparison(&counter.session).await?;
-            let png = found.map(|found| found.png.clone()).filter(|png| !png.is_empty());
-            Ok(png.map_or_else(nothing, |png| of_type("image/png", png)))
+            let found = comparison(&session).await?.filter(|found| !found.png.is_empty());
+            found.map_or_else(|| Ok(nothing()), |found| difference(&found))
         }
-        Route::Save(what) => saved(&counter.session, what).await,
+        Route::Save(what) => saved(&session, what).await,
         Route::Page | Route::Script(_) | Route::Style | Route::Leave => {
             Err(Refusal::new(StatusCode::NOT_FOUND, "there is nothing here"))
         }
@@ -307,7 +362,7 @@ impl<'q> Query<'q> {
 }
 
 /// Turns the scene around what is seen at a place, and answers with the state.
-async fn centre(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Refusal> {
+async fn centre(counter: &Counter, session: &Arc<Session>, place: PicturePlace) -> Result<Answer, Refusal> {
     let waiting = Arc::clone(session);
     // Depths come with the next coarse picture: other requests are answered meanwhile.
     let found = tokio::task::spawn_blocking(move || waiting.centre_on(place)).await;
@@ -316,21 +371,86 @@ async fn centre(session: &Arc<Session>, place: PicturePlace) -> Result<Answer, R
     if !found.map_err(|e| Refusal::of_error(&e))? {
         return Err(Refusal::new(StatusCode::NOT_FOUND, "nothing is seen there that the view could be centred on"));
     }
-    Ok(of_type("application/json", shown(session)?))
+    Ok(of_type("application/json", shown(counter, session)?))
 }
 
 /// The state behind a version: at once where it is newer, else when it is, or after a while.
-async fn state(session: &Session, after: u64) -> Result<Answer, Refusal> {
+async fn state(counter: &Counter, session: &Session, after: u64) -> Result<Answer, Refusal> {
     let mut versions = session.versions();
     let is_drawing = session.shown().drawing.is_some();
     let patience = if is_drawing { PATIENCE_WHILE_DRAWING } else { PATIENCE };
     // Without news the answer is what was known.
     let _ = timeout(patience, versions.wait_for(|version| *version > after)).await;
-    Ok(of_type("application/json", shown(session)?))
+    Ok(of_type("application/json", shown(counter, session)?))
 }
 
-fn shown(session: &Session) -> Result<Vec<u8>, Refusal> {
-    json_of(&session.shown())
+fn shown(counter: &Counter, session: &Session) -> Result<Vec<u8>, Refusal> {
+    let most_file_bytes = counter.opener.as_ref().map(|opener| opener.most_bytes);
+    json_of(&Told { shown: &session.shown(), most_file_bytes })
+}
+
+/// Opens a file that a page hands over, in the place of the view before; where that is refused, the view before goes on.
+async fn open(counter: &Arc<Counter>, name: &str, request: Request<Incoming>) -> Result<Answer, Refusal> {
+    let refused = |status, message| Refusal::new(status, message);
+    let Some(Opener { most_bytes, .. }) = counter.opener else {
+        return Err(refused(StatusCode::NOT_FOUND, "this view opens no files; start another one with the file"));
+    };
+    if content_type(&request) != Some("application/octet-stream") {
+        return Err(refused(StatusCode::UNSUPPORTED_MEDIA_TYPE, "expected a file as application/octet-stream"));
+    }
+    let name = file_name(name)?;
+    if counter.session().is_recording() {
+        let message =
+            "this view is recorded (--record), and a recording is of one scene; start another one with the file";
+        return Err(refused(StatusCode::CONFLICT, message));
+    }
+    let turn = counter.turn.try_acquire();
+    let _turn = turn.map_err(|_| refused(StatusCode::CONFLICT, "another file is being opened; try again after it"))?;
+    if let Some(bytes) = request.body().size_hint().exact() {
+        check_size(bytes, most_bytes)?;
+    }
+    let received = receive(request.into_body(), name, most_bytes).await?;
+    let opening = Arc::clone(counter);
+    // Reading takes a while: other requests are answered meanwhile.
+    let opened = tokio::task::spawn_blocking(move || open_received(&opening, received)).await;
+    opened.map_err(|_| refused(StatusCode::INTERNAL_SERVER_ERROR, "opening this file failed"))??;
+    Ok(of_type("application/json", shown(counter, &counter.session())?))
+}
+
+/// Opens a file that was received. The data of the view before makes room first.
+fn open_received(counter: &Counter, received: Received) -> Result<(), Refusal> {
+    let Some(opener) = &counter.opener else { return Ok(()) };
+    let Received { folder, file } = received;
+    let before = counter.session();
+    counter.current().next = Some(folder);
+    let refusal = if before.rest() {
+        match (opener.open)(file.clone()) {
+            Ok(session) => {
+                {
+                    let mut current = counter.current();
+                    current.session = Arc::new(session);
+                    current.folder = current.next.take();
+                }
+                before.close();
+                return Ok(());
+            }
+            Err(error) => {
+                let refusal = Refusal::of_error(&error);
+                let message = refusal.message.replace(&organza::printable(&file.path), &file.name);
+                Refusal { message, ..refusal }
+            }
+        }
+    } else {
+        let message = "the picture in the making takes long to stop; try again after it";
+        Refusal::new(StatusCode::SERVICE_UNAVAILABLE, message)
+    };
+    counter.current().next = None;
+    before.wake();
+    Err(refusal)
+}
+
+fn content_type(request: &Request<Incoming>) -> Option<&str> {
+    request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok())
 }
 
 /// No news, and no fault.
@@ -360,6 +480,15 @@ async fn comparison(session: &Arc<Session>) -> Result<Option<Arc<Comparison>>, R
     found.map_err(|e| Refusal::of_error(&e))
 }
 
+/// A difference, which names the kept picture and the state that it is of.
+fn difference(found: &Comparison) -> Result<Answer, Refusal> {
+    let mut answer = of_type("image/png", found.png.clone());
+    let pair = HeaderValue::from_str(&format!("{}/{}", found.kept, found.generation));
+    let pair = pair.map_err(|_| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, "two numbers are no header"))?;
+    answer.headers_mut().insert(HeaderName::from_static("organza-pair"), pair);
+    Ok(answer)
+}
+
 fn json_of(document: &impl Serialize) -> Result<Vec<u8>, Refusal> {
     let bytes = serde_json::to_vec(document);
     bytes.map_err(|e| Refusal::new(StatusCode::INTERNAL_SERVER_ERROR, &format!("the state is no JSON: {e}")))
@@ -385,10 +514,9 @@ async fn picture(session: &Session, after: u64) -> Result<Answer, Refusal> {
 }
 
 /// Takes events in, and answers with the state.
-async fn events(session: &Arc<Session>, request: Request<Incoming>) -> Result<Answer, Refusal> {
+async fn events(counter: &Counter, session: &Session, request: Request<Incoming>) -> Result<Answer, Refusal> {
     let bad = |message: &str| Refusal::new(StatusCode::BAD_REQUEST, message);
-    let content = request.headers().get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok());
-    if content != Some("application/json") {
+    if content_type(&request) != Some("application/json") {
         return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "expected events as application/json"));
     }
     let body = Limited::new(request.into_body(), MOST_BODY_BYTES).collect();
@@ -402,7 +530,7 @@ async fn events(session: &Arc<Session>, request: Request<Incoming>) -> Result<An
     let events: Vec<Event> = serde_json::from_slice(&body.to_bytes())
         .map_err(|e| bad(&format!("events: {}", organza::shown(&e.to_string()))))?;
     session.apply(&events).map_err(|e| Refusal::of_error(&e))?;
-    Ok(of_type("application/json", shown(session)?))
+    Ok(of_type("application/json", shown(counter, session)?))
 }
 
 /// A file to save. Its name is given by the page.

@@ -3,7 +3,12 @@
 
 use super::own::Own;
 use crate::scene::SceneLight;
-use splat_core::{Camera, Cloud, DAabb, Slide};
+use glam::Vec3;
+use rayon::prelude::*;
+use splat_core::{Aabb, Camera, Cloud, DAabb, Slide};
+
+/// Splats that one thread looks at before it helps another: the boxes of a thousand objects take less time than so many.
+const SPLATS_AT_A_TIME: usize = 1 << 14;
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
@@ -32,9 +37,29 @@ pub(super) fn normalize(
 }
 
 /// The bounds of all splats and objects; empty where there is nothing.
-pub(super) fn bounds(cloud: &Cloud, natives: &[Own]) -> DAabb {
+fn bounds(cloud: &Cloud, natives: &[Own]) -> DAabb {
     let bounds = cloud.bounds();
     // Nothing stays nothing: its corners are infinite.
     let splats = DAabb::new(cloud.origin + bounds.min.as_dvec3(), cloud.origin + bounds.max.as_dvec3());
     natives.iter().map(Own::world_box).fold(splats, DAabb::union)
+}
+
+/// The bounds of each of so many objects and its splats; empty where there is nothing of one.
+pub(crate) fn object_bounds(cloud: &Cloud, natives: &[Own], objects: usize) -> Vec<DAabb> {
+    let nothing = || vec![Aabb::EMPTY; objects];
+    let with = |mut boxes: Vec<Aabb>, (object, place): (&u32, &Vec3)| {
+        let around = &mut boxes[*object as usize];
+        *around = around.union(Aabb { min: *place, max: *place });
+        boxes
+    };
+    let join = |a: Vec<Aabb>, b: Vec<Aabb>| a.into_iter().zip(b).map(|(a, b)| a.union(b)).collect();
+    let splats = cloud.object.par_iter().zip(&cloud.position).with_min_len(SPLATS_AT_A_TIME);
+    let splats: Vec<Aabb> = splats.fold(nothing, with).reduce(nothing, join);
+    // Nothing stays nothing: its corners are infinite.
+    let place = |corner: Vec3| cloud.origin + corner.as_dvec3();
+    let mut boxes: Vec<DAabb> = splats.iter().map(|b| DAabb::new(place(b.min), place(b.max))).collect();
+    for native in natives {
+        boxes[native.object] = boxes[native.object].union(native.world_box());
+    }
+    boxes
 }

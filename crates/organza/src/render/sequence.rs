@@ -82,9 +82,10 @@ impl Sequence {
         &self.left.files
     }
 
-    /// A box around all that the last frame was made of, in view or not and cut away from a preview or not, world units; `None` where it was made of nothing.
-    pub fn bounds(&self) -> Option<DAabb> {
-        self.left.bounds().filter(|bounds| !bounds.is_empty())
+    /// A box around all that the last frame made of each object of its scene, in view or not and cut away from a preview or not, world units. It is empty
+    /// for an object without anything, and there is none before the first frame.
+    pub fn object_bounds(&self) -> Vec<DAabb> {
+        self.left.object_bounds()
     }
 
     /// Also a frame that will be drawn: all are added before the first is drawn, with the camera that [`crate::fitted`] finds. Little is
