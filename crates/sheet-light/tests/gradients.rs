@@ -105,14 +105,14 @@ fn gradients_of_the_field_that_is_gathered_are_those_of_the_twin() {
 }
 
 #[test]
-fn gradients_of_the_field_know_nothing_of_slabs() {
+fn gradients_of_the_field_are_those_of_a_sphere_however_wide_a_pixel_is() {
     let radius = 1.6;
     let material = Material::default();
     let tf = transfer(&[(-1.61, 0.0), (-1.59, 500.0)]);
     let cartesian = grid([24, 24, 24], cubic(0.2), |p: DVec3| -p.length());
     let mut volumes = [volume(&cartesian, &tf, &material)];
     volumes[0].normals = true;
-    for (size, slab_width) in [(64, None), (64, Some(0.02)), (24, Some(0.02))] {
+    for (size, slab_width) in [(64, Some(0.02)), (64, Some(0.01)), (50, Some(0.02))] {
         let camera = parallel([3.0, 2.0, 8.0], 4.0, [size, size]);
         for kernel in [GatherKernel::Gaussian, GatherKernel::Linear] {
             let params = Params {

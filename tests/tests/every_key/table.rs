@@ -489,7 +489,7 @@ fn render() -> Vec<Entry> {
             .but(These(&["implicit"]), NO_VOXELS),
         of(BALL, "render.sheets.kernel_sections", "render.sheets.kernel_sections=1").by(SHEETS),
         of(VOLUME, "render.sheets.gradients", "render.sheets.gradients='volume'").by(SHEETS).with(PHONG),
-        of(VOLUME, "render.sheets.gradients", "render.sheets.gradients='kernel'").by(SHEETS).with(PHONG),
+        of(VOLUME, "render.sheets.gradients", "render.sheets.gradients='sheets'").by(SHEETS).with(PHONG),
         of(BALL_AND_SURFACE, "render.sheets.accumulation", "render.sheets.accumulation='f16'").by(SHEETS),
         of(BALL, "render.sheets.transmittance_cutoff", "render.sheets.transmittance_cutoff=0.9")
             .by(SHEETS)

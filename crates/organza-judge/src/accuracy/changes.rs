@@ -194,6 +194,7 @@ fn sheets(render: &RenderSettings, settings: &mut Vec<Stated>) {
     add("kernel_sections", sheets.kernel_sections.to_string());
     add("accumulation", precision(sheets.accumulation));
     let gradients = match sheets.gradients {
+        SheetGradients::Auto => "auto",
         SheetGradients::Sheets => "sheets",
         SheetGradients::Volume => "volume",
         SheetGradients::Kernel => "kernel",

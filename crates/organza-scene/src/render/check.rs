@@ -236,6 +236,7 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         kernel_sections: check_sections(at, raw.kernel_sections.unwrap_or(256))?,
         accumulation: check_accumulation(raw.accumulation),
         gradients: match raw.gradients {
+            RawGradients::Auto => SheetGradients::Auto,
             RawGradients::Sheets => SheetGradients::Sheets,
             RawGradients::Volume => SheetGradients::Volume,
             RawGradients::Kernel => SheetGradients::Kernel,

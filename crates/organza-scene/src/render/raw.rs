@@ -109,8 +109,8 @@ pub(crate) struct RawSheets {
     pub(crate) kernel_sections: Option<u32>,
     /// Precision of the sums of voxels in a slab and of slabs in a pixel, "f32", "f16" or "auto" (the default): the plan takes "f32".
     pub(crate) accumulation: RawAccumulation,
-    /// Where normals come from, "sheets" (default), differences of neighbouring pixels and slabs, "volume", differences at voxels, or "kernel", the field that
-    /// gathered slabs read.
+    /// Where normals come from: "sheets", differences of neighbouring pixels and slabs, "volume", differences at voxels, "kernel", the field that gathered slabs
+    /// read, or "auto" (default), "kernel" where slabs are gathered, else "sheets".
     pub(crate) gradients: RawGradients,
     /// A pixel is finished when its transmittance is below this, from 0 to below 1; default 1/1024.
     pub(crate) transmittance_cutoff: Option<f64>,
@@ -142,6 +142,7 @@ pub(crate) enum RawKernel {
 #[schemars(rename = "Gradients")]
 pub(crate) enum RawGradients {
     #[default]
+    Auto,
     Sheets,
     Volume,
     Kernel,

@@ -424,6 +424,8 @@ pub enum Reconstruction {
 /// Where the normals of volumes come from that reflect about their gradients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SheetGradients {
+    /// As slabs get their values: of the kernel where they are gathered, of sheets where they are splatted.
+    Auto,
     /// Differences of neighbouring pixels and slabs.
     Sheets,
     /// Central differences at voxels, interpolated.

@@ -433,7 +433,7 @@ fn sheeted<'a>(frame: &'a Frame<'a>, options: &RenderOptions, cost: &mut CostRec
     let volumes = volumes(&frame.matter()).collect();
     let input = SheetInput { splats, ..frame.sheet_input(volumes, frame.lit_by(maps)) };
     let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
-    let params = Params { reconstruction: form.reconstruction, ..params(frame.scene, frame.loaded.exponent, options) };
+    let params = params(frame.scene, form.reconstruction, frame.loaded.exponent, options);
     cost.measure(pass::SHEETS, |stage| {
         stage.items_in = input.volumes.iter().map(|v| v.grid.values.len() as u64).sum();
         let sheeted = prepare(input, &params, Some(frame.progress)).map_err(|e| refuse(frame, e))?;
@@ -466,30 +466,33 @@ impl<'a> Frame<'a> {
         Ok(match none {
             true => None,
             false if half::is_asked(self.scene) => {
-                Some(half::width(self, &params(self.scene, self.loaded.exponent, options))? * unit)
+                let form = reconstruction::chosen(self.scene, &self.loaded.own, &self.camera);
+                let params = params(self.scene, form.reconstruction, self.loaded.exponent, options);
+                Some(half::width(self, &params)? * unit)
             }
             false => Some(sheeted(self, options, cost)?.slabs().1 * unit),
         })
     }
 }
 
-/// Parameters of sheets, for lengths that are a 2^`exponent`th of the scene's.
-fn params(scene: &Scene, exponent: i32, options: &RenderOptions) -> Params {
+/// Parameters of sheets that get their values so, for lengths that are a 2^`exponent`th of the scene's.
+fn params(scene: &Scene, reconstruction: Reconstruction, exponent: i32, options: &RenderOptions) -> Params {
     let settings = &scene.render.sheets;
     let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
         classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
         aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
-        // The plan may have them gathered instead.
-        reconstruction: Reconstruction::Splat,
+        reconstruction,
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,
         accumulation: settings.accumulation,
         gradients: match settings.gradients {
-            SheetGradients::Sheets => Gradients::Sheets,
             SheetGradients::Volume => Gradients::Volume,
             SheetGradients::Kernel => Gradients::Kernel,
+            SheetGradients::Sheets => Gradients::Sheets,
+            SheetGradients::Auto if reconstruction == Reconstruction::Splat => Gradients::Sheets,
+            SheetGradients::Auto => Gradients::Kernel,
         },
         lighting: Lighting::Joint,
         transmittance_cutoff: settings.transmittance_cutoff as f32,

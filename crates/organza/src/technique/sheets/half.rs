@@ -177,7 +177,7 @@ pub(super) fn bytes(
     let bodies = Bodies { volumes: &volumes, splats };
     // Of counts alone: no length among the parameters plays a part.
     let form = reconstruction::chosen(matter.scene, matter.own, matter.camera);
-    let sheets = Params { reconstruction: form.reconstruction, ..params(matter.scene, 0, options) };
+    let sheets = params(matter.scene, form.reconstruction, 0, options);
     let params = half_params(matter.scene, sheets);
     let lamps = points.iter().filter_map(|point| swept(matter.scene, point));
     let (served, mapped): (Vec<_>, Vec<_>) =
@@ -207,8 +207,8 @@ pub(super) fn draw(
     input.polygons = &polygons;
     input.splats = splats.as_ref().map(|splats| splats.input(frame));
     let form = reconstruction::chosen(frame.scene, &frame.loaded.own, &frame.camera);
-    let sheets = params(frame.scene, frame.loaded.exponent, session.options);
-    let params = half_params(frame.scene, Params { reconstruction: form.reconstruction, ..sheets });
+    let sheets = params(frame.scene, form.reconstruction, frame.loaded.exponent, session.options);
+    let params = half_params(frame.scene, sheets);
     super::warn(frame, &input.sheets.volumes, session.warnings);
     frame.progress.begin(stage::SHEETS);
     frame.tick()?;
