@@ -11,7 +11,6 @@ use rstar::primitives::Line;
 use rstar::{AABB, RTree};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::{Cloud, Footprint, Mesh, SplatKind};
-use std::collections::HashMap;
 
 /// Share of a disc's radius within which it hides.
 const CORE: f32 = Footprint::CORE;
@@ -35,17 +34,28 @@ pub(crate) fn open_edges(mesh: &Mesh) -> Vec<[u32; 2]> {
     let open: Vec<[u32; 2]> =
         edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| same[0]).collect();
     drop(edges);
-    let mut first = HashMap::new();
-    let mut places = HashMap::new();
-    for &v in open.iter().flatten() {
-        // −0 is 0.
-        let place = (mesh.position[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
-        places.insert(v, *first.entry(place).or_insert(v));
+    let first_there = first_vertices(mesh, &open);
+    let joined = |[a, b]: [u32; 2]| sorted(first_there[a as usize], first_there[b as usize]);
+    // With their place among the open ones, which they keep.
+    let mut joined: Vec<([u32; 2], usize)> = open.par_iter().map(|edge| joined(*edge)).zip(0..open.len()).collect();
+    joined.par_sort_unstable();
+    let alone = joined.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0]);
+    let mut kept: Vec<usize> = alone.filter(|([a, b], _)| a != b).map(|(_, rank)| rank).collect();
+    kept.par_sort_unstable();
+    kept.into_iter().map(|rank| open[rank]).collect()
+}
+
+/// For each vertex of some edges the least one at its place; of other vertices anything.
+fn first_vertices(mesh: &Mesh, edges: &[[u32; 2]]) -> Vec<u32> {
+    // −0 is 0.
+    let place = |v: u32| (mesh.position[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut vertices: Vec<([u32; 3], u32)> = edges.par_iter().flatten_iter().map(|v| (place(*v), *v)).collect();
+    vertices.par_sort_unstable();
+    let mut first_there = vec![0; mesh.position.len()];
+    for at_one_place in vertices.chunk_by(|a, b| a.0 == b.0) {
+        at_one_place.iter().for_each(|(_, v)| first_there[*v as usize] = at_one_place[0].1);
     }
-    let joined = |[a, b]: [u32; 2]| sorted(places[&a], places[&b]);
-    let mut times: HashMap<[u32; 2], u32> = HashMap::new();
-    open.iter().for_each(|edge| *times.entry(joined(*edge)).or_default() += 1);
-    open.into_iter().filter(|edge| places[&edge[0]] != places[&edge[1]] && times[&joined(*edge)] == 1).collect()
+    first_there
 }
 
 fn sorted(a: u32, b: u32) -> [u32; 2] {
