@@ -3,7 +3,6 @@
 
 mod coarse;
 mod engines;
-pub(crate) mod extent;
 mod light;
 mod lists;
 pub(crate) mod matter;
@@ -12,7 +11,6 @@ mod splats;
 
 use coarse::Shown;
 pub(crate) use engines::OpaqueEngines;
-pub(crate) use extent::Extent;
 pub(crate) use light::Maps;
 use lists::Lists;
 pub(crate) use on_device::Chained;

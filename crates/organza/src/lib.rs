@@ -35,6 +35,7 @@ mod brightness;
 mod choose;
 pub mod cost;
 mod error;
+mod extent;
 mod form;
 mod frame;
 mod load;

@@ -5,7 +5,8 @@ use crate::cost::{
     Change, Count, CountedPass, ENTRIES_PER_SPLAT, Item, Prediction, Translucent, before_reading, joined, samples,
     shadow_map,
 };
-use crate::frame::{Extent, Frame};
+use crate::extent::Extent;
+use crate::frame::Frame;
 use crate::load::own::Own;
 use crate::scene::{LightPoint, SceneObject, Technique};
 use crate::technique::{EVERYWHERE, Fold, OwnWork, TABLE};

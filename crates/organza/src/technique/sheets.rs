@@ -9,10 +9,10 @@ mod polygons;
 mod reconstruction;
 
 use crate::cost::{Count, Item, Translucent};
+use crate::extent::{Extent, SlantedBox, shown_length};
 use crate::form::Form;
-use crate::frame::extent::{SlantedBox, shown_length};
 use crate::frame::matter::Matter;
-use crate::frame::{Extent, Frame, Shaded};
+use crate::frame::{Frame, Shaded};
 use crate::load::Loaded;
 use crate::load::own::{Body, Own};
 use crate::pass;

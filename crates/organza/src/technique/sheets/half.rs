@@ -5,9 +5,10 @@
 mod splats;
 
 use super::{params, reconstruction, refuse, volumes};
+use crate::extent::Extent;
 use crate::form::{Form, PlannedObject};
+use crate::frame::Frame;
 use crate::frame::matter::{Carries, CarriesLight, Matter};
-use crate::frame::{Extent, Frame};
 use crate::pass;
 use crate::scene::{self, LightPoint, RenderSettings, Scene, SceneLight, Slicing, SoftShadows, Technique};
 use crate::statistics::SourceFacts;
