@@ -80,7 +80,7 @@ pub(crate) fn choose_footprints(
                 (0..ids.len()).into_par_iter().with_min_len(CHUNK).find_first(|i| column(*i) >= layers.len() as f64);
             if let Some(i) = beyond {
                 let found = format!("{} in the column `footprint`", column(i));
-                let expected = "an index of the scene's `footprints`, which are counted from 0";
+                let expected = "an index of the scene's `footprints`, which are counted from 0; an object that states a `footprint` ignores the column";
                 return Err(params.bad_text("footprint", found, expected));
             }
             ids.for_each(|(i, id)| *id = column(i) as u8);

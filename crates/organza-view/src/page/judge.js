@@ -244,6 +244,8 @@ function lookAgain() {
   const place = cursor || (pointer && pictureBelow(pointer));
   unknown = 0;
   if (place) lookBelow(place, false);
+  // What was read is of another picture, and nobody points at this one.
+  else at("below-text").textContent = "Point at the picture to read its values";
 }
 
 /// Looks below a place of the picture; of several in a short time the last.

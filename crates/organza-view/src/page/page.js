@@ -101,7 +101,9 @@ function lost() {
 
 function sentence(error) {
   // A message may begin with the name of a file, which keeps its letters.
-  return error.hint ? `${error.message}. ${error.hint.charAt(0).toUpperCase()}${error.hint.slice(1)}.` : error.message;
+  if (!error.hint) return error.message;
+  const hint = error.hint.charAt(0).toUpperCase() + error.hint.slice(1);
+  return `${error.message}. ${hint}${/[.?!]$/.test(hint) ? "" : "."}`;
 }
 
 let isOfPicture = false;

@@ -39,7 +39,7 @@ pub(crate) fn settled<'s>(scene: Cow<'s, Scene>, context: Context<'_>) -> Result
     let mut ways: Vec<Way> = ways(&scene, &facts).collect();
     for way in &mut ways {
         way.refusal = if way.scatters_again && switched == Some(false) {
-            Some("the scene switches `scatter` off".to_owned())
+            Some("`scatter` is switched off".to_owned())
         } else if !way.scatters_again && asked_for {
             Some("the scene asks for light that is scattered again and again".to_owned())
         } else {
@@ -530,7 +530,7 @@ mod tests {
         );
         let off = "[render]\neffects = { scatter = 'off' }\n";
         let switched = compared(&[CLOUD, off], &usual);
-        assert!(switched.iter().any(|one| one.reason == "the scene switches `scatter` off"), "{switched:?}");
+        assert!(switched.iter().any(|one| one.reason == "`scatter` is switched off"), "{switched:?}");
         // A scene that names its techniques compares nothing.
         let named = settled_with(&(VIEW.to_owned() + CLOUD + "[render]\ntechnique = 'points'\n"), &usual).unwrap();
         assert_eq!(named.render.choice, None);

@@ -50,8 +50,7 @@ impl Candidate {
 
     /// Where the scene switches it.
     pub(super) fn switched(label: &str, is_on: bool, without: &str, bound: Bound) -> Self {
-        let reason =
-            if is_on { "the scene switches it on".to_owned() } else { format!("the scene switches it off: {without}") };
+        let reason = if is_on { "it is switched on".to_owned() } else { format!("it is switched off: {without}") };
         Self::new(label, Choice::Settled { is_on, reason, bound })
     }
 

@@ -77,7 +77,7 @@ fn candidate(light: &LightStatistics, shines: bool, gain: f64, statistics: &Stat
     let settled =
         |why: &str| Candidate::new(label, Choice::Settled { is_on: true, reason: format!("{why}; {on}"), bound });
     if light.has_shadow == Some(true) {
-        return settled("the scene switches it on");
+        return settled("it is switched on");
     }
     if statistics.layers.iter().any(|layer| layer == "shadow") {
         return settled("the layer `shadow` shows it");

@@ -42,6 +42,6 @@ fn candidate(light: &LightStatistics, shines: bool, statistics: &Statistics) -> 
     let stands = if points == 1 { "1 point stands".to_owned() } else { format!("{points} points stand") };
     // Off, its size would be gone.
     let is_switched = SwitchedEffect::find(&statistics.switched, EffectKind::Soft, label).is_some();
-    let reason = if is_switched { "the scene switches it on".to_owned() } else { format!("{stands} for its size") };
+    let reason = if is_switched { "it is switched on".to_owned() } else { format!("{stands} for its size") };
     Candidate::new(label, Choice::Settled { is_on: true, reason, bound })
 }
