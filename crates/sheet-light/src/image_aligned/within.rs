@@ -113,8 +113,7 @@ impl<'a> Within<'a> {
         RayParts { within: self, middle, to_eye: way, optical_depth, weight: thickness.max(zero).min(simd.lanes(1.0)) }
     }
 
-    /// Writes the weighted mean of the slopes of the voxels of a cell that lie in the volume, number by number, in the place of a lane. Returns 1, or 0
-    /// where none of them does.
+    /// Writes the weighted mean of the slopes of the voxels of a cell that lie in the volume, number by number, in the place of a lane. Whether any does.
     #[inline]
     fn mean_of_voxels(
         &self,
@@ -124,7 +123,7 @@ impl<'a> Within<'a> {
         cells: &Cells,
         lane: usize,
         slopes: &mut [[f32; MAX_LANES]; 12],
-    ) -> f32 {
+    ) -> bool {
         let mut sum = [0.0; 12];
         let mut whole = 0.0;
         for row in 0..4 {
@@ -147,12 +146,12 @@ impl<'a> Within<'a> {
             }
         }
         if whole == 0.0 {
-            return 0.0;
+            return false;
         }
         for n in 0..12 {
             slopes[n][lane] = sum[n] / whole;
         }
-        1.0
+        true
     }
 
     /// The slopes of a light at a voxel; `None` outside of the volume.
@@ -210,8 +209,8 @@ impl<S: Simd> RayParts<'_, S> {
         self.weight.store(&mut weights);
         let mut slopes = [[0.0; MAX_LANES]; 12];
         for lane in lanes(cells.lane_bits) {
-            if weights[lane] > 0.0 {
-                weights[lane] *= self.within.mean_of_voxels(light, neighbours, voxels, cells, lane, &mut slopes);
+            if weights[lane] > 0.0 && !self.within.mean_of_voxels(light, neighbours, voxels, cells, lane, &mut slopes) {
+                weights[lane] = 0.0;
             }
         }
         let weight = Lanes::load(simd, &weights);
