@@ -66,7 +66,8 @@ pub(crate) fn view(py: Python<'_>, mut given: Given, title: String, how: How<'_>
     let work = move |progress: &Progress| {
         let load = given.load(in_memory, &options)?;
         let text = given.text.clone().into_bytes();
-        let (file, files) = (given.file.clone(), Files::default());
+        let file = given.file.clone();
+        let files = Files::default();
         let opening = Opening { title, inputs: Vec::new(), is_fleeting: false, file, text, load, options, files };
         let server = Server::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))?.framed_by(Framing::ThisMachine);
         Ok((server, Arc::new(Session::open(opening, progress)?)))

@@ -171,11 +171,11 @@ pub(crate) fn replayed(
         Replayed { state, left_out }
     };
     let scene = |state: &State| source.scene(source.overrides(state, stated)?);
-    let all = played(file.events.len());
-    let mut error = match scene(&all.state) {
+    let replayed = played(file.events.len());
+    let mut error = match scene(&replayed.state) {
         Ok(scene) => {
-            file.check_columns(&all.state, &scene, context)?;
-            return Ok(all);
+            file.check_columns(&replayed.state, &scene, context)?;
+            return Ok(replayed);
         }
         Err(error) => error,
     };

@@ -3,6 +3,7 @@
 //! The counted work drives the progress bar, `explain`, and the sentence about a long run. No picture depends on it: it reads no clock and
 //! decides nothing.
 
+pub(crate) mod extent;
 mod loading;
 mod prediction;
 mod rates;

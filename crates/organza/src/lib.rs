@@ -35,7 +35,6 @@ mod brightness;
 mod choose;
 pub mod cost;
 mod error;
-mod extent;
 mod form;
 mod frame;
 mod load;

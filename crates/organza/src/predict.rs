@@ -1,11 +1,11 @@
 //! Counted work of a frame, before it is drawn, and the keys of its scene that would change it.
 
 use crate::choose::{CausedMap, CausedObject, CausedWork, row, technique_of};
+use crate::cost::extent::Extent;
 use crate::cost::{
     Change, Count, CountedPass, ENTRIES_PER_SPLAT, Item, Prediction, Translucent, before_reading, joined, samples,
     shadow_map,
 };
-use crate::extent::Extent;
 use crate::frame::Frame;
 use crate::load::own::Own;
 use crate::scene::{LightPoint, SceneObject, Technique};

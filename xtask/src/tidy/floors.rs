@@ -8,7 +8,7 @@ const HOUSE: &str = "crates/organza/src/";
 
 /// The modules of each floor, from the ground up.
 const FLOORS: [&[&str]; 16] = [
-    &["error", "extent", "form", "pass", "stage"],
+    &["error", "form", "pass", "stage"],
     &["statistics"],
     &["cost"],
     &["options"],

@@ -255,7 +255,7 @@ fn check_reconstruction(at: &At<'_>, raw: &RawSheets) -> Result<Reconstruction, 
         ("aligned", raw.aligned == Some(RawAligned::Axis), "they lie along the view"),
         ("accumulation", raw.accumulation == RawAccumulation::F16, "they sum nothing over voxels"),
     ];
-    // What gathered slabs alone have asks for them.
+    // The key that asks for gathered slabs: these two values are known to gathered slabs alone.
     let asked = if raw.kernel == Some(RawKernel::Linear) {
         Some("kernel = \"linear\"")
     } else if raw.gradients == RawGradients::Kernel {

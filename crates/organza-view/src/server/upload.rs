@@ -25,7 +25,7 @@ const NOT_IN_NAMES: [char; 9] = ['/', '\\', ':', '*', '?', '"', '<', '>', '|'];
 /// Opens a data file.
 type Open = Box<dyn Fn(GivenFile) -> Result<Session, Error> + Send + Sync>;
 
-/// What a view does with files that its page hands over.
+/// How a view opens data files that are dropped on its page.
 pub struct Opener {
     pub(super) most_bytes: u64,
     pub(super) open: Open,
@@ -93,7 +93,7 @@ pub(super) async fn receive(mut body: Incoming, name: String, most_bytes: u64) -
         let next = next.map_err(|_| Refusal::new(StatusCode::REQUEST_TIMEOUT, "the file comes too slowly"))?;
         let Some(frame) = next else { break };
         let frame = frame.map_err(|_| Refusal::new(StatusCode::BAD_REQUEST, "the file broke off"))?;
-        // What is no data says nothing of a file.
+        // A frame without data has trailing headers, which say nothing of the file.
         let Ok(bytes) = frame.into_data() else { continue };
         received += bytes.len() as u64;
         check_size(received, most_bytes)?;

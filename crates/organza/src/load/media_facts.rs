@@ -6,7 +6,7 @@ use super::light_statistics;
 use super::loading::Loading;
 use super::object_context::ObjectContext;
 use crate::Error;
-use crate::extent::{SlantedBox, shown_length};
+use crate::cost::extent::{SlantedBox, shown_length};
 use crate::scene::{MatterSource, Scene, SceneLight, SceneObject, Source, SourceData, VolumeSource};
 use crate::statistics::MediumFacts;
 use convert::MediumBody;

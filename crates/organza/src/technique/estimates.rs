@@ -12,7 +12,7 @@
 //! times with g = 0.6 (`again_and_again_is_near_path_tracing`).
 
 use super::{Row, row};
-use crate::extent;
+use crate::cost::extent;
 use crate::plan::Estimate;
 use crate::scene::{EffectKind, RenderSettings, Scene, SceneObject, Slicing, Source, SwitchedEffect, Technique};
 use crate::statistics::{MediumFacts, MeshFacts, SourceFacts};

@@ -8,8 +8,8 @@ mod half;
 mod polygons;
 mod reconstruction;
 
+use crate::cost::extent::{Extent, SlantedBox, shown_length};
 use crate::cost::{Count, Item, Translucent};
-use crate::extent::{Extent, SlantedBox, shown_length};
 use crate::form::Form;
 use crate::frame::matter::Matter;
 use crate::frame::{Frame, Shaded};
@@ -107,7 +107,7 @@ pub(crate) fn foresees(asked: &Asked<'_>, camera: &Camera) -> OwnWork {
     let samples = camera.pixels() as f64 * medium.shown_length / medium.spacing;
     let wide = medium.spacing * Extent::new(&medium.bounds, camera).samples_per_unit;
     let voxels = (medium.bounds.max - medium.bounds.min).element_product() / medium.spacing.powi(3);
-    // What shows little is splatted, in about the same time.
+    // A volume of which little shows is splatted, which takes about as long as it would gathered.
     let slab_samples = samples * (GAUSSIAN_SAMPLE + lamps.of_a_sample(wide)) + FILTERED_VOXEL * voxels;
     OwnWork { slab_samples, ..OwnWork::default() }
 }
@@ -128,9 +128,9 @@ impl Lamps {
         }
     }
 
-    /// What they take of a sample, with the voxels about it that nobody has asked shadows for, where a voxel is so many samples wide.
+    /// Time that they take for one sample: lighting it, and its share of the look-ups at voxels. A voxel is `wide` samples wide.
     fn of_a_sample(&self, wide: f64) -> f64 {
-        // What is shown has voxels within and about as many beside it.
+        // A look-up serves all samples about a voxel, and the voxels beside those that show are looked up too: twice as many.
         let voxels = CORNERS.min(2.0 / (wide * wide));
         self.bare * LIT_SAMPLE + self.shadowed * (SHADOWED_SAMPLE + voxels * SHADOWED_VOXEL)
     }

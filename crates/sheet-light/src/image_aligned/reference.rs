@@ -47,7 +47,7 @@ struct Sheets {
     classes: Vec<[f64; 4]>,
     /// Where each ray is inside.
     crossings: Vec<[f64; 2]>,
-    /// What is gathered.
+    /// The lattice that pixels read, where sheets are gathered.
     lattice: Option<Exact>,
     size: [usize; 2],
 }

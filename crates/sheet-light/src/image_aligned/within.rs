@@ -187,7 +187,7 @@ impl<'a> Within<'a> {
 }
 
 impl<S: Simd> RayParts<'_, S> {
-    /// What the eye gets of a light, in the place of what arrives at the middle, `through`, where the medium is thick.
+    /// Share of a light that the eye gets from each part of a ray. Where the medium is thin that is `through`, the share that arrives at the middle of the part.
     #[inline(always)]
     pub(crate) fn replace(
         &self,

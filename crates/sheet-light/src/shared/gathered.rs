@@ -126,7 +126,7 @@ impl<'a> Gathered<'a> {
         Corner { before: self.before as f64, cell, start, last }
     }
 
-    /// What any place is counted from: the first cell.
+    /// The first cell, for places anywhere in the lattice.
     #[inline(always)]
     fn first_corner(&self) -> Corner {
         self.corner(&Box3 { low: IVec3::MIN, high: IVec3::MAX })

@@ -77,7 +77,7 @@ impl GradientVolume {
     }
 }
 
-/// What a gradient of 1 a step along each axis of a lattice is in the space of places, from which `rows` lead to it, the longest of length 1.
+/// By axis of a lattice: the direction of a gradient along it, in the space of places, which `rows` lead to the lattice. The longest has length 1.
 pub(crate) fn directions(rows: &[[f64; 4]; 3]) -> [[f32; 3]; 3] {
     let rows = rows.map(|[x, y, z, _]| DVec3::new(x, y, z));
     let longest = rows.iter().map(|row| row.length()).fold(0.0, f64::max);

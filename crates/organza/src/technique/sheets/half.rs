@@ -5,7 +5,7 @@
 mod splats;
 
 use super::{params, reconstruction, refuse, volumes};
-use crate::extent::Extent;
+use crate::cost::extent::Extent;
 use crate::form::{Form, PlannedObject};
 use crate::frame::Frame;
 use crate::frame::matter::{Carries, CarriesLight, Matter};

@@ -1,7 +1,7 @@
 //! Reconstruction of volumes in slabs: each voxel writes into them, or each of their pixels reads the lattice.
 
 use super::half;
-use crate::extent::Extent;
+use crate::cost::extent::Extent;
 use crate::load::own::{Body, Own};
 use crate::scene::{self, Scene, SheetKernel, Technique};
 use sheet_light::{GatherKernel, KernelShape, Params, Reconstruction};

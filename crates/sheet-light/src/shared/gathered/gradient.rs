@@ -15,7 +15,7 @@ use splat_core::raster::pulp::Simd;
 pub(crate) struct KernelGradients {
     /// From places to lattice coordinates.
     lattice_from_place: [[f32; 4]; 3],
-    /// What a gradient of 1 a step along each axis is in the space of places, the longest of length 1: so no scale of the scene makes anything vanish.
+    /// By axis of the lattice: the direction of a gradient along it, in the space of places. The longest has length 1, so that no scale of the scene makes a gradient vanish.
     directions: [[f32; 3]; 3],
 }
 
@@ -79,7 +79,7 @@ impl Gathered<'_> {
         }
     }
 
-    /// Those of a cubic B-spline of the 64 voxels around each place.
+    /// Derivatives of the cubic B-spline of the 64 voxels around each place.
     #[inline(always)]
     fn cubic_gradients<S: Simd>(
         &self,
