@@ -321,11 +321,12 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     ));
 }
 
-/// The precision of the sums of slabs, what slabs lie across, and how often they scatter light: every planned picture of this technique has these.
-pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSetting> {
+/// Where normals of volumes come from, the precision of the sums of slabs, what slabs lie across, and how often they scatter light: every planned picture of this technique has these.
+pub(crate) fn settings(scene: &Scene, loaded: &Loaded, _: &Plan) -> Vec<PlannedSetting> {
     let sheets = &scene.render.sheets;
     let precision = points::precision(sheets.accumulation);
     let is_stated = scene.render.stated.accumulation_of_sheets;
+    let normals = normals(scene, loaded);
     let accumulation = PlannedSetting::new("render.sheets.accumulation", precision, is_stated, points::IN_F32);
     let slicing = |value: &str, reason: &str| {
         PlannedSetting::new("render.sheets.slicing", format!("\"{value}\""), !sheets.may_slice, reason)
@@ -336,7 +337,7 @@ pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSettin
     let scene::Slicing::HalfVector { scattering: again, .. } = sheets.slicing else {
         let reason =
             "slabs lie across the view unless a scene, or a technique that is `auto`, asks for light that they carry";
-        return vec![accumulation, slicing("view", reason)];
+        return normals.into_iter().chain([accumulation, slicing("view", reason)]).collect();
     };
     let often = match again {
         None if scene.render.choice.is_some() => scattering(
@@ -349,7 +350,38 @@ pub(crate) fn settings(scene: &Scene, _: &Loaded, _: &Plan) -> Vec<PlannedSettin
         }
         Some(_) => scattering("forward_and_back", "by its estimate, light that media scatter again is seen"),
     };
-    vec![accumulation, slicing("half_vector", "slabs across half vectors carry light through media themselves"), often]
+    let slicing = slicing("half_vector", "slabs across half vectors carry light through media themselves");
+    normals.into_iter().chain([accumulation, slicing, often]).collect()
+}
+
+/// Where normals come from, where a volume reflects about its gradient.
+fn normals(scene: &Scene, loaded: &Loaded) -> Option<PlannedSetting> {
+    let reflects = |native: &Own| matches!(native.body, Body::Cells { normals: true, .. });
+    if !loaded.own.iter().any(|native| native.technique == Technique::Sheets && reflects(native)) {
+        return None;
+    }
+    let camera = loaded.camera.with_samples(scene.render.antialias);
+    let form = reconstruction::chosen(scene, &loaded.own, &camera);
+    let (name, reason) = match gradients(scene, form.reconstruction) {
+        Gradients::Sheets => ("sheets", "splatted slabs have no field with a derivative"),
+        Gradients::Volume => ("volume", "differences at voxels are those of the data"),
+        Gradients::Kernel => {
+            ("kernel", "the field that gathered slabs read has a derivative, which slabs do not change")
+        }
+    };
+    let is_stated = scene.render.sheets.gradients != SheetGradients::Auto;
+    Some(PlannedSetting::new("render.sheets.gradients", format!("\"{name}\""), is_stated, reason))
+}
+
+/// Where normals come from, where slabs get their values so.
+fn gradients(scene: &Scene, reconstruction: Reconstruction) -> Gradients {
+    match scene.render.sheets.gradients {
+        SheetGradients::Volume => Gradients::Volume,
+        SheetGradients::Kernel => Gradients::Kernel,
+        SheetGradients::Sheets => Gradients::Sheets,
+        SheetGradients::Auto if reconstruction == Reconstruction::Splat => Gradients::Sheets,
+        SheetGradients::Auto => Gradients::Kernel,
+    }
 }
 
 pub(crate) use half::carries;
@@ -487,13 +519,7 @@ fn params(scene: &Scene, reconstruction: Reconstruction, exponent: i32, options:
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },
         sections: settings.kernel_sections,
         accumulation: settings.accumulation,
-        gradients: match settings.gradients {
-            SheetGradients::Volume => Gradients::Volume,
-            SheetGradients::Kernel => Gradients::Kernel,
-            SheetGradients::Sheets => Gradients::Sheets,
-            SheetGradients::Auto if reconstruction == Reconstruction::Splat => Gradients::Sheets,
-            SheetGradients::Auto => Gradients::Kernel,
-        },
+        gradients: gradients(scene, reconstruction),
         lighting: Lighting::Joint,
         transmittance_cutoff: settings.transmittance_cutoff as f32,
         limits: Limits::bytes(options.max_memory),
