@@ -279,6 +279,7 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
     let place = Place::new(&format!("{SMALL_SCENE}{FOG}"));
     place.write("events.json", "[{\"do\": \"opacity\", \"object\": \"fog\", \"opacity\": 0.5}]");
     place.write("fly.json", "[{\"do\": \"fly\"}]");
+    place.write("lacking.toml", format!("{SMALL_SCENE}[[object]]\nname = \"a\"\nmesh = \"none.ply\"\n"));
     for (code, arguments, said) in [
         (
             3,
@@ -289,6 +290,7 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
         (4, &["s.toml", "--play", "none.json"], "cannot read the events"),
         (4, &["s.toml", "--record", "fly.json"], "fly.json"),
         (4, &["none.toml"], "none.toml"),
+        (4, &["lacking.toml"], "none.ply: cannot read: no such file"),
         (2, &["s.toml", "--listen", "example.org"], "expected `localhost` or a numeric address"),
         (2, &["s.toml", "--backend", "ash"], "--backend ash is for `organza render`"),
         (2, &["s.toml", "--force"], "--record"),
@@ -297,7 +299,7 @@ fn what_cannot_be_viewed_is_refused_before_an_address_is_printed() {
         let out = place.expect(code, &arguments, said);
         assert!(out.stdout.is_empty(), "{arguments:?}");
     }
-    assert_eq!(place.made(), ["events.json", "fly.json"]);
+    assert_eq!(place.made(), ["events.json", "fly.json", "lacking.toml"]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::console::{self, signals};
 use super::given::{given, is_scene, wish, write_first};
 use super::session::{overrides, parse_scene, processor_only, render_options, unused_goal, without_effect};
 use organza::output::{Target, Targets};
-use organza::scene::LoadOptions;
+use organza::scene::{LoadOptions, Scene, SceneObject};
 use organza::{Error, Files, InMemory, Progress, RenderOptions, printable};
 use organza_survey::Wish;
 use organza_view::{
@@ -74,11 +74,20 @@ fn left_out_events(left_out: &[String]) -> Vec<String> {
     sentences
 }
 
+/// Refuses a scene whose data are not there, before anybody opens a page of it.
+fn check_files(scene: &Scene) -> Result<(), Error> {
+    let data = scene.objects.iter().filter(|object| object.visible).flat_map(SceneObject::paths);
+    let missing = data.chain(scene.images()).find(|path| !path.exists());
+    let error = || std::io::Error::new(std::io::ErrorKind::NotFound, "no such file");
+    missing.map_or(Ok(()), |path| Err(Error::io(path, "cannot read", error())))
+}
+
 /// Reads the scene, or makes one of data files, and begins to draw it.
 fn open(arguments: &ViewArguments, played: &EventFile, progress: &Progress) -> Result<Opened, Error> {
     let scene_arguments = &arguments.scene;
     let (given, files) = given(scene_arguments, None)?;
     let scene = parse_scene(scene_arguments, &given, None, None)?;
+    check_files(&scene)?;
     unused_goal(&scene.render.goal, "`organza view`").iter().for_each(|sentence| console::warn(sentence));
     without_effect(scene_arguments, &scene).iter().for_each(|sentence| console::warn(sentence));
     for path in arguments.record.iter() {

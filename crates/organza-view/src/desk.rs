@@ -505,6 +505,22 @@ impl Desk {
         self.tell(papers);
     }
 
+    /// Waits for a first picture, whole or coarse, or for the reason why there is none; after `patience` nothing is known against it.
+    pub(crate) fn wait_for_first(&self, patience: Duration) -> Result<(), Failure> {
+        let end = Instant::now() + patience;
+        let mut papers = self.papers();
+        loop {
+            if let Some(failure) = papers.failure.clone() {
+                return Err(failure);
+            }
+            let left = end.saturating_duration_since(Instant::now());
+            if papers.picture.is_some() || papers.is_closed || left.is_zero() {
+                return Ok(());
+            }
+            papers = self.changed.wait_timeout(papers, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
     /// Waits for the whole picture of the newest request.
     pub(crate) fn wait_for_whole(&self) -> Result<Arc<Picture>, Failure> {
         let mut papers = self.papers();

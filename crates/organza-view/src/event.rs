@@ -62,6 +62,14 @@ pub enum Event {
     },
     /// Goes back to the scene's own camera.
     Reset {},
+    /// Takes the last step back: the viewpoint stays where it is.
+    Undo {},
+    /// Does again what was taken back.
+    Redo {},
+    /// Takes all changes back but those of the viewpoint and of the size.
+    Restore {},
+    /// Ends a step: what follows is another one, though it changes the same.
+    Done {},
     /// Shows or hides an object.
     Show {
         /// Name of the object.
@@ -268,6 +276,7 @@ impl Event {
             Self::Transfer { knots: None, .. } | Self::Color { color: None, .. } => Ok(()),
             Self::LightShadow { .. } | Self::Layer { .. } => Ok(()),
             Self::Technique { .. } | Self::ColorBy { .. } | Self::ObjectTechnique { .. } => Ok(()),
+            Self::Undo {} | Self::Redo {} | Self::Restore {} | Self::Done {} => Ok(()),
             Self::Reset {} | Self::Show { .. } | Self::Opacity { .. } | Self::Effect { .. } => Ok(()),
             Self::Exposure { .. } | Self::Size { .. } => Ok(()),
         }
@@ -277,6 +286,13 @@ impl Event {
     pub(crate) fn word(&self) -> String {
         let document = serde_json::to_value(self).unwrap_or_default();
         document["do"].as_str().unwrap_or_default().to_owned()
+    }
+
+    /// What it changes: its name in files and the names in it.
+    pub(crate) fn subject(&self) -> String {
+        let document = serde_json::to_value(self).unwrap_or_default();
+        let name = |key: &str| document[key].as_str().unwrap_or_default();
+        ["do", "object", "light", "name"].map(name).join("\n")
     }
 
     /// Whether it changes where the eye is, and nothing else.
@@ -375,6 +391,10 @@ mod tests {
             Event::Zoom { steps: -1.5 },
             Event::LookFrom { azimuth: 30.0, elevation: -90.0, distance: None, centre: Some([1.0, 2.0, 3.0]) },
             Event::Reset {},
+            Event::Undo {},
+            Event::Redo {},
+            Event::Restore {},
+            Event::Done {},
             Event::Show { object: "a \"b\"".into(), visible: false },
             Event::Opacity { object: "c".into(), opacity: None },
             Event::Effect { name: "shadow.sun".into(), switch: Switch::Off },

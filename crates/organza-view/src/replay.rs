@@ -1,6 +1,7 @@
 //! Files of events, and the state behind them.
 
 use crate::event::Event;
+use crate::history::History;
 use crate::recording::MOST_EVENTS;
 use crate::state::{Source, State};
 use crate::viewpoint::Viewpoint;
@@ -143,7 +144,7 @@ fn parsed(path: &Path, text: &[u8]) -> Result<Vec<Event>, Error> {
 
 /// The state behind recorded events.
 pub(crate) struct Replayed {
-    pub(crate) state: State,
+    pub(crate) history: History,
     /// A sentence for each event that names what the scene lacks.
     pub(crate) left_out: Vec<String>,
 }
@@ -160,21 +161,21 @@ pub(crate) fn replayed(
     context: Context<'_>,
 ) -> Result<Replayed, Error> {
     let played = |count: usize| {
-        let mut state = State::default();
+        let mut history = History::default();
         let mut left_out = Vec::new();
         for (rank, event) in file.events[..count].iter().enumerate() {
             // An event that fails changes nothing.
-            if let Err(error) = state.apply(event, stated, first) {
+            if let Err(error) = history.apply(event, stated, first) {
                 left_out.push(file.error(rank, &error).to_string());
             }
         }
-        Replayed { state, left_out }
+        Replayed { history, left_out }
     };
     let scene = |state: &State| source.scene(source.overrides(state, stated)?);
     let replayed = played(file.events.len());
-    let mut error = match scene(&replayed.state) {
+    let mut error = match scene(replayed.history.present()) {
         Ok(scene) => {
-            file.check_columns(&replayed.state, &scene, context)?;
+            file.check_columns(replayed.history.present(), &scene, context)?;
             return Ok(replayed);
         }
         Err(error) => error,
@@ -184,7 +185,7 @@ pub(crate) fn replayed(
     let mut refused = file.events.len();
     while refused - taken > 1 {
         let middle = taken.midpoint(refused);
-        match scene(&played(middle).state) {
+        match scene(played(middle).history.present()) {
             Ok(_) => taken = middle,
             Err(earlier) => {
                 refused = middle;

@@ -9,12 +9,13 @@ use crate::depths::below::{Below, below};
 pub use crate::desk::Failure;
 use crate::desk::{Desk, Request, Seen};
 use crate::event::{Cut, Event};
+use crate::history::History;
 use crate::lights::{Direction, LightRow, direction_of, kind_of as kind_of_light};
 use crate::picture::{Drawn, EffectRow, Facts, Level, Picture, Size};
 use crate::recording::Recording;
 use crate::replay::{EventFile, Replayed, replayed};
 use crate::scene_text;
-use crate::state::{Opening, Source, State};
+use crate::state::{Opening, Source};
 use crate::viewpoint::Viewpoint;
 use crate::wording::GivenNames;
 use organza::output::Format;
@@ -79,7 +80,7 @@ struct Studio {
     stated: Scene,
     /// Its objects.
     uncut: Arc<Vec<SceneObject>>,
-    state: State,
+    history: History,
     /// The scene of the state.
     scene: Scene,
     generation: u64,
@@ -120,6 +121,10 @@ pub struct Shown {
     /// The effects of the newest picture, with the present switches. The whole picture of the state counts as newest
     /// once it is drawn.
     pub effects: Vec<EffectRow>,
+    /// Whether there is a step to take back.
+    pub can_undo: bool,
+    /// Whether there is a step that was taken back.
+    pub can_redo: bool,
     /// The layer in the place of the beauty.
     pub layer: Option<String>,
     /// Settings from fast to exact; `None` before a page asks for them.
@@ -269,7 +274,7 @@ impl Session {
         // Where the scene has its camera found, this is what lights go around.
         stated.target = first.centre;
         let names = GivenNames::new(&stated, &inputs);
-        let Replayed { state, left_out } = replayed(played, &source, &stated, &first, context)?;
+        let Replayed { history, left_out } = replayed(played, &source, &stated, &first, context)?;
         let desk = Arc::new(Desk::new(first));
         let artist = Artist::new(files, options);
         let board = Arc::clone(&desk);
@@ -284,14 +289,14 @@ impl Session {
             source,
             stated,
             uncut,
-            state: State::default(),
+            history: History::default(),
             scene,
             generation: 0,
             edition: 0,
             is_on_disk,
             recording: None,
         };
-        studio.take(state, &desk)?;
+        studio.take(history, &desk)?;
         let number = SESSIONS.fetch_add(1, Ordering::Relaxed);
         let session =
             Self { number, desk, studio: Mutex::new(studio), kept: Mutex::new(None), artist: Mutex::new(Some(thread)) };
@@ -310,9 +315,15 @@ impl Session {
     pub fn apply(&self, events: &[Event]) -> Result<(), Error> {
         let mut studio = self.studio();
         let first = self.desk.scene_viewpoint();
-        let mut state = studio.state.clone();
-        events.iter().try_for_each(|event| state.apply(event, &studio.stated, &first))?;
-        studio.take(state, &self.desk)?;
+        let mut history = studio.history.clone();
+        events.iter().try_for_each(|event| history.apply(event, &studio.stated, &first))?;
+        if history.present() == studio.history.present() {
+            // The picture in the making serves still.
+            studio.history = history;
+            self.desk.tell_change();
+        } else {
+            studio.take(history, &self.desk)?;
+        }
         if let Some(recording) = &mut studio.recording {
             recording.add(events);
         }
@@ -326,7 +337,8 @@ impl Session {
     pub fn centre_on(&self, place: PicturePlace) -> Result<bool, Error> {
         let Some(depths) = self.desk.wait_for_depths(LOOK_BELOW) else { return Ok(false) };
         let Some(centre) = depths.point_at(place) else { return Ok(false) };
-        let viewpoint = self.studio().state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
+        let viewpoint =
+            self.studio().history.present().viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         self.apply(&[Event::LookFrom {
             azimuth: viewpoint.azimuth.to_degrees(),
             elevation: viewpoint.elevation.to_degrees(),
@@ -342,7 +354,7 @@ impl Session {
 
     /// Keeps the whole picture of the present state to compare others with, in the place of the one before; false while it is drawn.
     pub fn keep(&self) -> bool {
-        let step = self.studio().state.accuracy().step;
+        let step = self.studio().history.present().accuracy().step;
         let picture = self.picture();
         let Some(drawn) = self.finished() else { return false };
         let Some(picture) = picture.filter(|picture| picture.facts.generation == drawn.generation) else {
@@ -436,7 +448,7 @@ impl Session {
     pub fn reload(&self) {
         let mut studio = self.studio();
         studio.edition += 1;
-        if let Err(error) = studio.reread().and_then(|state| studio.take(state, &self.desk)) {
+        if let Err(error) = studio.reread().and_then(|history| studio.take(history, &self.desk)) {
             self.desk.refuse(&error);
         }
     }
@@ -444,9 +456,10 @@ impl Session {
     /// The state that a page shows beside the picture.
     pub fn shown(&self) -> Shown {
         let studio = self.studio();
+        let state = studio.history.present();
         let Seen { version, picture, failure, drawing, whole, effects, curves, boxes, columns, rungs, is_predicting } =
             self.desk.seen();
-        let viewpoint = studio.state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
+        let viewpoint = state.viewpoint().copied().unwrap_or_else(|| self.desk.scene_viewpoint());
         let row = |(rank, object): (usize, &SceneObject)| ObjectRow {
             name: object.name.clone(),
             kind: kind_of(&object.source),
@@ -454,10 +467,10 @@ impl Session {
             opacity: (!object.source.is_medium()).then(|| studio.scene.opacity_of(object)),
             color: object.color.map(|color| color.map(number)),
             columns: columns.get(&object.name).cloned().unwrap_or_default(),
-            color_by: studio.state.color_by_of(rank).map(|by| by.column.clone()),
-            map: studio.state.color_by_of(rank).and_then(|by| by.map.clone()),
-            technique: studio.state.technique_of(rank).map(str::to_owned),
-            is_recolored: studio.state.is_recolored(rank),
+            color_by: state.color_by_of(rank).map(|by| by.column.clone()),
+            map: state.color_by_of(rank).and_then(|by| by.map.clone()),
+            technique: state.technique_of(rank).map(str::to_owned),
+            is_recolored: state.is_recolored(rank),
             takes_color: takes_color(object),
             curve: CurveRow::of_object(object, curves.get(&object.name)),
             bounds: boxes.get(&object.name).map(ShownBox::new),
@@ -465,12 +478,12 @@ impl Session {
         let light = |(rank, light): (usize, &SceneLight)| LightRow {
             name: light.label.clone(),
             kind: kind_of_light(light),
-            stops: studio.state.stops_of(rank),
+            stops: state.stops_of(rank),
             direction: direction_of(light, studio.stated.target),
             shadow: light.shadow,
         };
         let switched = |effect: &EffectRow| EffectRow {
-            switch: studio.state.switch_of(&effect.name).unwrap_or(effect.switch),
+            switch: state.switch_of(&effect.name).unwrap_or(effect.switch),
             ..effect.clone()
         };
         let facts = picture.as_ref().map(|picture| &picture.facts);
@@ -485,18 +498,20 @@ impl Session {
             exposure: studio.scene.render.exposure,
             objects: studio.scene.objects.iter().enumerate().map(row).collect(),
             lights: studio.scene.lights.iter().enumerate().map(light).collect(),
-            cuts: studio.state.cuts().to_vec(),
+            cuts: state.cuts().to_vec(),
             bounds: boxes.values().copied().reduce(DAabb::union).as_ref().map(ShownBox::new),
             maps: scene::color_map_names().collect(),
             effects: effects.iter().map(switched).collect(),
-            layer: studio.state.layer().map(str::to_owned),
+            can_undo: studio.history.can_undo(),
+            can_redo: studio.history.can_redo(),
+            layer: state.layer().map(str::to_owned),
             accuracy: rungs.map(|rungs| ShownAccuracy {
-                step: studio.state.accuracy().step,
-                set: studio.state.accuracy().texts(),
+                step: state.accuracy().step,
+                set: state.accuracy().texts(),
                 rungs,
                 is_predicting,
             }),
-            technique: studio.state.technique().map(str::to_owned),
+            technique: state.technique().map(str::to_owned),
             kept: self.kept().as_ref().map(|keeping| keeping.kept.row.clone()),
             picture: picture.map(|picture| studio.names.in_facts(&picture.facts)),
             drawing: drawing.map(|(stage, share)| Drawing { stage, share }),
@@ -508,6 +523,15 @@ impl Session {
     /// The newest picture, if any is drawn yet.
     pub fn picture(&self) -> Option<Arc<Picture>> {
         self.desk.seen().picture
+    }
+
+    /// Waits for a first picture, coarse or whole, as long as `patience`.
+    ///
+    /// # Errors
+    /// The reason why none is drawn.
+    pub(crate) fn first_picture(&self, patience: Duration) -> Result<(), Failure> {
+        let named = |failure: Failure| Failure { message: self.studio().names.in_text(&failure.message), ..failure };
+        self.desk.wait_for_first(patience).map_err(named)
     }
 
     /// Waits for the whole picture of the present state.
@@ -538,8 +562,8 @@ impl Session {
     /// [`Error::Internal`] where the text would not be that of the same scene.
     pub fn scene_text(&self) -> Result<String, Error> {
         let studio = self.studio();
-        let Studio { source, state, stated, scene, .. } = &*studio;
-        let text = scene_text::changed(source, &source.overrides(state, stated)?)?;
+        let Studio { source, history, stated, scene, .. } = &*studio;
+        let text = scene_text::changed(source, &source.overrides(history.present(), stated)?)?;
         // What is saved is read as what is seen, or is not saved.
         let load = scene::LoadOptions { overrides: Vec::new(), ..source.load.clone() };
         let mut read = scene::parse(&source.file, text.as_bytes(), &load)?;
@@ -588,12 +612,13 @@ impl Session {
 }
 
 impl Studio {
-    /// Takes a state in the place of the present one, and asks for its picture.
+    /// Takes steps in the place of the present ones, and asks for a picture of the last.
     ///
     /// # Errors
     /// What its scene is refused for; the present state stays.
-    fn take(&mut self, state: State, desk: &Desk) -> Result<(), Error> {
-        let overrides = self.source.overrides(&state, &self.stated)?;
+    fn take(&mut self, history: History, desk: &Desk) -> Result<(), Error> {
+        let state = history.present();
+        let overrides = self.source.overrides(state, &self.stated)?;
         let told = self.source.told(&overrides);
         let scene = self.source.scene(overrides)?;
         let stated = if state.accuracy().set.is_empty() {
@@ -613,15 +638,15 @@ impl Studio {
             has_own_camera: state.viewpoint().is_none(),
             layer: state.layer().map(str::to_owned),
         });
-        self.state = state;
+        self.history = history;
         self.scene = scene;
         Ok(())
     }
 
     /// Reads the scene's file again; the changes of objects and lights that it still has stay.
-    fn reread(&mut self) -> Result<State, Error> {
+    fn reread(&mut self) -> Result<History, Error> {
         if !self.is_on_disk {
-            return Ok(self.state.clone());
+            return Ok(self.history.clone());
         }
         let text = scene::read(&self.source.file)?;
         let source = Source { text, file: self.source.file.clone(), load: self.source.load.clone() };
@@ -629,11 +654,11 @@ impl Studio {
         if stated.fit.is_some() {
             stated.target = self.stated.target;
         }
-        let state = self.state.of_another_scene(&self.stated, &stated);
+        let history = self.history.of_another_scene(&self.stated, &stated);
         self.source = source;
         self.uncut = Arc::new(stated.objects.clone());
         self.stated = stated;
-        Ok(state)
+        Ok(history)
     }
 }
 

@@ -197,6 +197,17 @@ impl State {
         self.viewpoint.as_ref()
     }
 
+    /// The same seen from another viewpoint.
+    #[cfg(test)]
+    pub(crate) fn seen_from(self, viewpoint: Option<Viewpoint>) -> Self {
+        Self { viewpoint, ..self }
+    }
+
+    /// Takes the changes of another state; the viewpoint stays.
+    pub(crate) fn become_like(&mut self, other: Self) {
+        *self = Self { viewpoint: self.viewpoint, ..other };
+    }
+
     /// The layer in the place of the beauty.
     pub(crate) fn layer(&self) -> Option<&str> {
         self.layer.as_deref()
@@ -249,6 +260,9 @@ impl State {
                 self.viewpoint = Some(Viewpoint { distance, centre, ..turned });
             }
             Event::Reset {} => self.viewpoint = None,
+            Event::Restore {} => *self = Self { viewpoint: self.viewpoint, size: self.size, ..Self::default() },
+            // Steps are those of the history.
+            Event::Undo {} | Event::Redo {} | Event::Done {} => {}
             Event::Show { object, visible } => {
                 self.change(scene, object)?.visible = Some(*visible);
                 // An object that was switched off as an effect is shown by this.

@@ -545,6 +545,22 @@ fn a_file_that_cannot_be_opened_is_refused_by_its_name_and_the_view_before_goes_
 }
 
 #[test]
+fn a_file_that_is_read_and_cannot_be_drawn_leaves_the_view_before() {
+    let running = start_opening();
+    running.session.whole_picture().unwrap();
+    // Discs of so many spacings reach farther than the points are apart: conversion refuses them.
+    let answer = running.open("wide.csv", "x,y,z,footprint\n0,0,0,7\n1,0,0,7\n0,1,0,7\n");
+    assert!(answer.status == 422 && answer.body.contains("footprint"), "{}", answer.body);
+    assert!(handed_over("wide.csv").is_empty());
+    let end = Instant::now() + Duration::from_secs(30);
+    while running.get("save/picture.png?client=a").status != 200 {
+        assert!(Instant::now() < end, "{}", running.get("state?client=a").body);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(running.get("state?client=a").body.contains("scene.toml"));
+}
+
+#[test]
 fn files_of_strangers_and_names_that_lead_elsewhere_are_refused() {
     let running = start_opening();
     let Running { token, address, .. } = &running;

@@ -118,6 +118,50 @@ fn a_cut_of_one_object_goes_through_that_object_alone() {
 }
 
 #[test]
+fn changes_are_taken_back_one_by_one_and_the_view_stays() {
+    let place = Place::new(&(SMALL_SCENE.to_owned() + FOG));
+    let view = View::start(&place, &["s.toml"]);
+    let mut page = opened(&view);
+    page.press("1");
+    page.wait_for("Math.abs(shown.viewpoint.elevation) < 1e-6");
+    page.wait_for(WHOLE);
+    let first = page.value(PICTURE);
+    assert_eq!(page.value("at('undo').disabled && at('redo').disabled"), true);
+    let exposure = |stops: &str| {
+        format!(
+            "(({{ exposure }}) => {{ exposure.value = {stops}; for (const kind of ['input', 'change']) exposure.dispatchEvent(new Event(kind, {{ bubbles: true }})); }})({{ exposure: at('exposure') }})"
+        )
+    };
+    for stops in ["0.5", "1"] {
+        page.value(&exposure(stops));
+        page.wait_for(&format!("shown.exposure === {stops} && !isChanging"));
+    }
+    page.wait_for(WHOLE);
+    let second = page.value(PICTURE);
+    page.value("rows.effects.get('shadow.0').inputs.off.click()");
+    page.wait_for("!rows.lights.get('0').shadow.checked");
+    page.wait_for(WHOLE);
+    page.value("rows.lights.get('0').shadow.click()");
+    page.wait_for("rows.lights.get('0').shadow.checked && shown.effects.every((effect) => effect.switch === 'auto')");
+    // The tick, the switch, and both exposures.
+    page.value("at('undo').click()");
+    page.wait_for("!rows.lights.get('0').shadow.checked");
+    page.value("at('undo').click()");
+    page.wait_for("rows.lights.get('0').shadow.checked");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), second);
+    page.value("at('undo').click()");
+    page.wait_for("shown.exposure === 0.5");
+    page.value("at('restore').click()");
+    page.wait_for("shown.exposure === 0 && shown.can_undo");
+    page.wait_for(WHOLE);
+    assert_eq!(page.value(PICTURE), first);
+    page.value("at('undo').click()");
+    page.wait_for("shown.exposure === 0.5 && shown.can_redo");
+    ends_well(&page, view);
+}
+
+#[test]
 fn a_number_that_is_refused_gives_way_to_the_last_good_one() {
     let place = Place::new(SMALL_SCENE);
     let scene = volume(&place);
@@ -135,6 +179,7 @@ fn a_number_that_is_refused_gives_way_to_the_last_good_one() {
         ("cutRows[0].number", "1e30", "found 1e30"),
         ("rows.objects.get('ramp').curve.extinction.input", "-1", "Extinction: expected a number from 0"),
         ("rows.objects.get('ramp').curve.value.input", "", "Value: expected a number"),
+        ("rows.objects.get('ramp').curve.value.input", "500", "to 210, found 500"),
     ] {
         let before = page.value(&format!("{field}.value"));
         page.value(&format!("{field}.focus(), {field}.value = '{typed}', {field}.dispatchEvent(new Event('change'))"));

@@ -25,8 +25,34 @@ pub struct Below {
     pub position: Option<[f64; 3]>,
     /// The object that is seen first.
     pub object: Option<String>,
+    /// The place in the coordinates of the object's file, where these are other than the world's.
+    pub file_place: Option<FilePlace>,
     /// The values of its data at that place.
     pub values: Vec<NamedValue>,
+}
+
+/// A place in the coordinates of a file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilePlace {
+    /// Units of the file.
+    pub position: [f64; 3],
+    /// World units that one unit of the file is long.
+    pub scale: f64,
+}
+
+impl FilePlace {
+    /// `None` for an object without a file, and for one that stands in the world as in its file.
+    fn new(object: &SceneObject, place: DVec3) -> Option<Self> {
+        let local = local_place(object, place);
+        let is_other = object.source.path().is_some() && !local.abs_diff_eq(place, 1e-9 * place.length());
+        is_other.then(|| Self { position: local.to_array(), scale: object.transform.scale })
+    }
+}
+
+/// A place of the world in an object's own coordinates.
+fn local_place(object: &SceneObject, place: DVec3) -> DVec3 {
+    let transform = &object.transform;
+    transform.rotation.inverse() * (place - transform.translation) / transform.scale
 }
 
 /// A number of an object's data.
@@ -65,8 +91,7 @@ impl DataOfObject {
 
     /// The numbers at a place, world units; none where data are not kept.
     fn at(&self, object: &SceneObject, place: DVec3) -> Vec<NamedValue> {
-        let transform = &object.transform;
-        let local = transform.rotation.inverse() * (place - transform.translation) / transform.scale;
+        let local = local_place(object, place);
         match self {
             // A volume whose regions are surfaces.
             Self::Volume(grid) if matches!(object.source, Source::Mesh(_)) => {
@@ -155,6 +180,7 @@ pub(crate) fn below(
         depth: depths.depth_at(place),
         position: position.map(DVec3::into),
         object: object.map(|object| object.name.clone()),
+        file_place: object.zip(position).and_then(|(object, position)| FilePlace::new(object, position)),
         values,
     }
 }

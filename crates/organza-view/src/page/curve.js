@@ -174,6 +174,14 @@ class Curve {
     return Math.max(before, Math.min(behind, value));
   }
 
+  /// The value that was typed for a knot, where it is between its neighbours; else the page says so, and there is none.
+  typedValue(i) {
+    const before = i > 0 ? this.knots[i - 1].value : -MOST_NUMBER;
+    const behind = i + 1 < this.knots.length ? this.knots[i + 1].value : MOST_NUMBER;
+    const value = numberIn(this.value.input, before, behind);
+    return value === null ? null : this.between(i, value);
+  }
+
   changed() {
     this.draw();
     this.take(this.knots);
@@ -181,11 +189,13 @@ class Curve {
 
   typed() {
     const knot = this.knots[this.chosen];
-    const value = numberIn(this.value.input, -MOST_NUMBER, MOST_NUMBER);
-    const extinction = value === null ? null : numberIn(this.extinction.input, 0, MOST_NUMBER);
-    if (extinction === null) return;
-    if (document.activeElement === this.value.input) knot.value = this.between(this.chosen, value);
-    if (document.activeElement === this.extinction.input) knot.extinction = extinction;
+    // Fields show rounded numbers: only those that were typed are taken.
+    const isTyped = ({ input }) => document.activeElement === input;
+    const value = isTyped(this.value) ? this.typedValue(this.chosen) : knot.value;
+    const extinction = isTyped(this.extinction) ? numberIn(this.extinction.input, 0, MOST_NUMBER) : knot.extinction;
+    if (value === null || extinction === null) return;
+    knot.value = value;
+    knot.extinction = extinction;
     if (hexOf(knot.color) !== this.color.input.value) knot.color = linearOf(this.color.input.value);
     this.changed();
   }

@@ -285,6 +285,9 @@ function belowText(below) {
   if (below.object !== null) words.push(below.object);
   if (below.position) words.push(`at ${below.position.map((number) => rounded(number)).join(", ")}`, `depth ${short(below.depth)}`);
   else words.push("nothing that hides what lies behind it");
+  // A length that a hand can tell apart in the picture, in units of the file.
+  const inFile = (number) => rounded(number * below.file_place.scale) / below.file_place.scale;
+  if (below.file_place) words.push(`in its file ${below.file_place.position.map((number) => Number(inFile(number).toPrecision(10))).join(", ")}`);
   for (const { name, value, meaning } of below.values) words.push(`${name} ${short(value)}${meaning ? ` ${meaning}` : ""}`);
   if (below.numbers.length > 0) {
     // An infinite number comes as none.

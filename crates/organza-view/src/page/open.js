@@ -2,6 +2,7 @@
 // A data file that is dropped on the page, or chosen, takes the place of the view before.
 
 let isOpening = false;
+let openingName = "";
 
 async function openFiles(files) {
   if (!shown || !isOpen) return;
@@ -22,6 +23,7 @@ async function openFiles(files) {
   }
   isOpening = true;
   trouble("");
+  openingName = file.name;
   sayOpening(`Opening ${file.name} …`);
   try {
     const answer = await fetch(`open?client=${client}&name=${encodeURIComponent(file.name)}`, {
@@ -29,7 +31,7 @@ async function openFiles(files) {
     });
     const found = await answer.json();
     if (answer.ok) show(found);
-    else trouble(sentence(found));
+    else trouble(`${sentence(found).replace(/\.?$/, ".")} The view before goes on.`);
   } catch {
     trouble(`${file.name} could not be handed over: a page can open no folder and no file that it may not read, and a file has 90 seconds. Start \`organza view\` with it.`);
   }
@@ -40,6 +42,11 @@ async function openFiles(files) {
 function sayOpening(text) {
   at("opening").textContent = text;
   at("opening").hidden = text === "";
+}
+
+/// Says how far the first picture of a file is.
+function showOpening(found) {
+  if (isOpening && found.opening && found.opening.stage) sayOpening(`Opening ${openingName}: ${found.opening.stage}`);
 }
 
 const hasFiles = (event) => event.dataTransfer && [...event.dataTransfer.types].includes("Files");

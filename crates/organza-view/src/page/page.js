@@ -15,10 +15,15 @@ let isOpen = true;
 
 let waiting = [];
 let isSending = false;
+/// Events that change no step: those of the viewpoint, which stays, and those about steps.
+const NO_STEPS = ["orbit", "pan", "zoom", "look_from", "reset", "undo", "redo", "done"];
+/// Whether a change was made since the last step has ended.
+let isChanging = false;
 /// What the page says once they are taken.
 let afterwards = "";
 
 function add(event) {
+  isChanging = event.do !== "done" && (isChanging || !NO_STEPS.includes(event.do));
   const last = waiting[waiting.length - 1];
   const adds = { orbit: ["right", "up"], pan: ["right", "up"], zoom: ["steps"] }[event.do];
   const replaces = {
@@ -32,6 +37,11 @@ function add(event) {
     waiting.push(event);
   }
   send();
+}
+
+/// A step ends when the hand lets go: behind the listeners of what it held.
+for (const name of ["pointerup", "click", "change", "keyup"]) {
+  document.addEventListener(name, () => setTimeout(() => isChanging && add({ do: "done" })));
 }
 
 async function send() {
@@ -170,7 +180,11 @@ function show(found, isAgain = false) {
   for (const side of ["width", "height"]) {
     if (!isHeld(at(side))) at(side).value = found.size[side];
   }
+  at("undo").disabled = !found.can_undo;
+  at("redo").disabled = !found.can_redo;
+  at("restore").disabled = !found.can_undo;
   at("open").hidden = found.most_file_bytes === null;
+  showOpening(found);
   stage.style.setProperty("--aspect", `${found.size.width} / ${found.size.height}`);
   for (const id of ["save-png", "save-exr"]) at(id).disabled = !found.is_whole;
 }
@@ -335,7 +349,7 @@ function makeObject(object) {
     children.push(element("span", { className: "color" }, [element("span", { textContent: "Colour" }), row.color, row.uncolored]));
   }
   row.column = choice(`Column that colours ${object.name}`, []);
-  row.map = choice(`Map of the colours of ${object.name}`, [["", "map that suits"], ...shown.maps.map((map) => [map, map])]);
+  row.map = choice(`Map of the colours of ${object.name}`, [["", "automatic map"], ...shown.maps.map((map) => [map, map])]);
   const colorBy = () => add({ do: "color_by", object: object.name, column: row.column.value || null, map: row.map.value || null });
   row.column.addEventListener("change", colorBy);
   row.map.addEventListener("change", colorBy);
@@ -354,7 +368,11 @@ function makeObject(object) {
 function showLights(lights) {
   at("lights-panel").hidden = lights.length === 0;
   rowsOf("lights", lights, makeLight, (row, light) => {
-    row.shadow.checked = light.shadow;
+    // An effect that is off overrules the light.
+    row.effect = `shadow.${light.name}`;
+    row.isOff = shown.effects.some((effect) => effect.name === row.effect && effect.switch === "off");
+    row.castsShadow = light.shadow;
+    row.shadow.checked = light.shadow && !row.isOff;
     if (!isHeld(row.stops)) row.stops.value = light.stops;
     row.value.textContent = `${light.stops > 0 ? "+" : ""}${Number(light.stops.toFixed(2))} EV`;
     if (!row.azimuth || !light.direction) return;
@@ -376,7 +394,11 @@ function makeLight(light) {
   row.value = element("output");
   row.stops.addEventListener("input", () => add({ do: "light_intensity", light: light.name, stops: Number(row.stops.value) }));
   row.shadow = element("input", { type: "checkbox", id });
-  row.shadow.addEventListener("change", () => add({ do: "light_shadow", light: light.name, shadow: row.shadow.checked }));
+  row.shadow.addEventListener("change", () => {
+    const shadow = row.shadow.checked;
+    if (shadow && row.isOff) add({ do: "effect", name: row.effect, switch: "auto" });
+    if (shadow !== row.castsShadow) add({ do: "light_shadow", light: light.name, shadow });
+  });
   const children = [
     element("span", { className: "name", textContent: light.name }),
     element("span", { className: "kind", textContent: light.kind }),
@@ -512,9 +534,10 @@ function showEffects(effects) {
     row.bound.textContent = boundText(effect.bound);
     row.why.textContent = effect.reason;
     const isDrawn = effect.called_for && !effect.lacking;
-    row.state.textContent = effect.fixed || (effect.lacking ? "lacking" : isDrawn ? "simulated" : "left out");
-    row.cost.textContent = costText(effect);
-    row.cost.title = costTitle(effect);
+    row.state.textContent = effect.fixed || (effect.lacking ? "called for, not drawn" : isDrawn ? "simulated" : "left out");
+    if (effect.measured_ms !== null) row.spent = costText(effect);
+    row.cost.textContent = effect.switch === "off" && row.spent ? `took ${row.spent}` : costText(effect);
+    row.cost.title = effect.switch === "off" && row.spent ? "Time of its passes in the last whole picture with it" : costTitle(effect);
     for (const [word, input] of Object.entries(row.inputs)) input.checked = effect.switch === word;
   }, order);
 }
@@ -536,7 +559,7 @@ function boundText(bound) {
   if (bound === 0) return "nothing";
   const percent = 100 * bound;
   if (percent < 0.01) return "< 0.01 %";
-  return `≤ ${percent < 10 ? Number(percent.toPrecision(2)) : Math.round(percent)} %`;
+  return `up to ${percent < 10 ? Number(percent.toPrecision(2)) : Math.round(percent)} %`;
 }
 
 function makeEffect(effect) {
@@ -672,7 +695,16 @@ const keys = {
 };
 const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
+/// Texts of a field have steps of their own.
+const isText = (input) => input.matches("textarea, input:not([type=range], [type=checkbox], [type=color])");
+
 document.addEventListener("keydown", (event) => {
+  const letter = event.key.toLowerCase();
+  if ((event.ctrlKey || event.metaKey) && !event.altKey && (letter === "z" || letter === "y") && !isText(event.target)) {
+    add({ do: letter === "y" || event.shiftKey ? "redo" : "undo" });
+    event.preventDefault();
+    return;
+  }
   if (event.ctrlKey || event.metaKey || event.altKey || at("keys").open) return;
   const isTyping = event.target.matches("input, select, textarea");
   const arrow = arrows[event.key];
@@ -695,6 +727,7 @@ document.addEventListener("keydown", (event) => {
 // ---- panels ----
 
 at("reset").addEventListener("click", () => add({ do: "reset" }));
+for (const change of ["undo", "redo", "restore"]) at(change).addEventListener("click", () => add({ do: change }));
 at("help").addEventListener("click", () => at("keys").showModal());
 at("technique").addEventListener("change", () => add({ do: "technique", technique: at("technique").value || null }));
 at("layer").addEventListener("change", () => add({ do: "layer", layer: at("layer").value || null }));

@@ -7,7 +7,8 @@ use super::upload::{Opener, Received, check_size, file_name, receive};
 use crate::accuracy::compare::Comparison;
 use crate::depths::PicturePlace;
 use crate::event::Event;
-use crate::session::{Session, Shown};
+use crate::session::{Drawing, Failure, Session, Shown};
+use crate::state::GivenFile;
 use crate::wording::{self, Said};
 use http_body_util::{BodyExt, Full, LengthLimitError, Limited};
 use hyper::body::{Body, Bytes, Incoming};
@@ -33,6 +34,9 @@ const BODY_TIME: Duration = Duration::from_secs(5);
 /// How long a request waits for news, at most; while something is drawn, so long for the next word of its progress.
 const PATIENCE: Duration = Duration::from_secs(20);
 const PATIENCE_WHILE_DRAWING: Duration = Duration::from_millis(250);
+
+/// Time that a file has for its first picture before it takes the place of the view before, picture or not: a socket is served for a while only.
+const FIRST_PICTURE: Duration = Duration::from_secs(20);
 
 /// The one policy: script, style and pictures of this server alone, and no other page around this one.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
@@ -80,8 +84,14 @@ impl Counter {
 pub(crate) struct Current {
     session: Arc<Session>,
     folder: Option<TempDir>,
-    /// Of a file that is being opened.
-    next: Option<TempDir>,
+    next: Option<Arriving>,
+}
+
+/// A file that is being opened.
+struct Arriving {
+    folder: TempDir,
+    /// The session that is to show it; `None` before it is read.
+    session: Option<Arc<Session>>,
 }
 
 impl Current {
@@ -93,7 +103,8 @@ impl Current {
     pub(crate) fn end(&mut self) {
         self.session.close();
         self.folder = None;
-        self.next = None;
+        let arriving = self.next.take().and_then(|next| next.session);
+        arriving.iter().for_each(|session| session.close());
     }
 }
 
@@ -104,6 +115,8 @@ struct Told<'s> {
     shown: &'s Shown,
     /// Most bytes of a file that a page may hand over; `None` where the view opens none.
     most_file_bytes: Option<u64>,
+    /// The first picture of a file that is being opened.
+    opening: Option<Drawing>,
 }
 
 type Answer = Response<Full<Bytes>>;
@@ -377,7 +390,7 @@ async fn centre(counter: &Counter, session: &Arc<Session>, place: PicturePlace) 
 /// The state behind a version: at once where it is newer, else when it is, or after a while.
 async fn state(counter: &Counter, session: &Session, after: u64) -> Result<Answer, Refusal> {
     let mut versions = session.versions();
-    let is_drawing = session.shown().drawing.is_some();
+    let is_drawing = session.shown().drawing.is_some() || counter.current().next.is_some();
     let patience = if is_drawing { PATIENCE_WHILE_DRAWING } else { PATIENCE };
     // Without news the answer is what was known.
     let _ = timeout(patience, versions.wait_for(|version| *version > after)).await;
@@ -386,7 +399,9 @@ async fn state(counter: &Counter, session: &Session, after: u64) -> Result<Answe
 
 fn shown(counter: &Counter, session: &Session) -> Result<Vec<u8>, Refusal> {
     let most_file_bytes = counter.opener.as_ref().map(|opener| opener.most_bytes);
-    json_of(&Told { shown: &session.shown(), most_file_bytes })
+    let arriving = counter.current().next.as_ref().and_then(|next| next.session.clone());
+    let opening = arriving.and_then(|session| session.shown().drawing);
+    json_of(&Told { shown: &session.shown(), most_file_bytes, opening })
 }
 
 /// Opens a file that a page hands over, in the place of the view before; where that is refused, the view before goes on.
@@ -417,36 +432,59 @@ async fn open(counter: &Arc<Counter>, name: &str, request: Request<Incoming>) ->
     Ok(of_type("application/json", shown(counter, &counter.session())?))
 }
 
-/// Opens a file that was received. The data of the view before makes room first.
+/// Opens a file that was received. The data of the view before makes room first; it goes on where the file has no first picture.
 fn open_received(counter: &Counter, received: Received) -> Result<(), Refusal> {
     let Some(opener) = &counter.opener else { return Ok(()) };
     let Received { folder, file } = received;
     let before = counter.session();
-    counter.current().next = Some(folder);
-    let refusal = if before.rest() {
-        match (opener.open)(file.clone()) {
-            Ok(session) => {
-                {
-                    let mut current = counter.current();
-                    current.session = Arc::new(session);
-                    current.folder = current.next.take();
-                }
-                before.close();
-                return Ok(());
-            }
-            Err(error) => {
-                let refusal = Refusal::of_error(&error);
-                let message = refusal.message.replace(&organza::printable(&file.path), &file.name);
-                Refusal { message, ..refusal }
-            }
-        }
+    counter.current().next = Some(Arriving { folder, session: None });
+    let opened = if before.rest() {
+        first_picture(counter, opener, file)
     } else {
         let message = "the picture in the making takes long to stop; try again after it";
-        Refusal::new(StatusCode::SERVICE_UNAVAILABLE, message)
+        Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, message))
     };
-    counter.current().next = None;
-    before.wake();
-    Err(refusal)
+    match opened {
+        Ok(session) => {
+            {
+                let mut current = counter.current();
+                current.session = session;
+                current.folder = current.next.take().map(|next| next.folder);
+            }
+            before.close();
+            Ok(())
+        }
+        Err(refusal) => {
+            counter.current().next = None;
+            before.wake();
+            Err(refusal)
+        }
+    }
+}
+
+/// Begins a session of a file, and waits for its first picture.
+///
+/// # Errors
+/// Why the file cannot be read, converted or drawn.
+fn first_picture(counter: &Counter, opener: &Opener, file: GivenFile) -> Result<Arc<Session>, Refusal> {
+    let GivenFile { path, name } = &file;
+    let session = (opener.open)(file.clone()).map_err(|error| {
+        let refusal = Refusal::of_error(&error);
+        let message = refusal.message.replace(&organza::printable(path), name);
+        Refusal { message, ..refusal }
+    })?;
+    let session = Arc::new(session);
+    if let Some(next) = &mut counter.current().next {
+        next.session = Some(Arc::clone(&session));
+    } else {
+        // The view has ended meanwhile.
+        session.close();
+    }
+    session.first_picture(FIRST_PICTURE).map_err(|Failure { message, hint, .. }| {
+        session.close();
+        Refusal { status: StatusCode::UNPROCESSABLE_ENTITY, message, hint }
+    })?;
+    Ok(session)
 }
 
 fn content_type(request: &Request<Incoming>) -> Option<&str> {
