@@ -83,6 +83,11 @@ pub(crate) struct Leaves {
 }
 
 impl Leaves {
+    /// What it leaves for a frame in which lights are brighter or darker: their shadow maps, if these are planned alike.
+    pub(crate) fn of_lights(self) -> Self {
+        Self { maps: self.maps, shaded: self.shaded, lists: Lists::default() }
+    }
+
     /// What the cells of each shadow map follow from: those whose entries were more than predicted are coarser than the plan has them.
     pub(crate) fn shadow_limits(&self, plan: &Plan) -> Vec<tsm::Limit> {
         match &self.maps {

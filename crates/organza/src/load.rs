@@ -334,6 +334,7 @@ impl Inputs<'_> {
         }
         let mut splats = loading.counts(&prepared, &planned)?;
         let convertible = prepared.iter().map(|p| p.prediction.splats).collect();
+        let shares = loading.shares(&prepared);
         let materials = materials(scene, &prepared);
         let points = lights.iter().map(SceneLight::count).sum();
         let work = before_conversion(scene, &splats, &planned, points, beside);
@@ -356,8 +357,8 @@ impl Inputs<'_> {
         let objects: Vec<Object> = scene.objects.iter().map(object::entry).collect();
         if scene.render.splat_share < 1.0 {
             let before = cloud.len();
-            cloud = cloud.fewer(scene.render.splat_share);
-            if cloud.len() == before {
+            cloud = cloud.fewer_of_each(|object| shares[object]);
+            if cloud.len() == before && shares.iter().any(|share| *share < 1.0) {
                 warnings.push(UNCHANGED.to_owned());
             }
             count_anew(&mut splats, &cloud, &objects);
@@ -453,7 +454,7 @@ fn merge(mut clouds: Vec<Cloud>) -> Cloud {
 }
 
 /// All lights, sorted by their bits so that the order of the file does not matter.
-fn lights(scene: &Scene) -> Vec<SceneLight> {
+pub(crate) fn lights(scene: &Scene) -> Vec<SceneLight> {
     let mut lights = scene.lights.clone();
     lights.sort_by_cached_key(|l| (l.light.key(), l.shadow, l.samples, format!("{:?}", l.slide)));
     lights

@@ -299,6 +299,19 @@ pub(crate) fn splats_serve(before: &Scene, after: &Scene, loaded: &Loaded) -> bo
         && chosen(loaded, after) == loaded.planned
 }
 
+/// Whether two scenes differ in the camera, in the exposure and in how bright lights are, and in nothing else.
+pub(crate) fn is_brighter(before: &Scene, after: &Scene) -> bool {
+    let mut alike =
+        Scene { camera: before.camera, target: before.target, sha256: before.sha256.clone(), ..after.clone() };
+    alike.render.exposure = before.render.exposure;
+    for (light, of_before) in alike.lights.iter_mut().zip(&before.lights) {
+        light.light.intensity = of_before.light.intensity;
+    }
+    // Of lights in one place the brighter comes behind.
+    let order = |scene: &Scene| load::lights(scene).into_iter().map(|light| light.label).collect::<Vec<_>>();
+    *before == alike && order(before) == order(after)
+}
+
 /// How the objects of a loaded scene would be drawn in the lights and by the settings of another.
 fn chosen(loaded: &Loaded, scene: &Scene) -> Vec<PlannedObject> {
     let lights = light_statistics(&scene.lights, &scene.render.effects);

@@ -15,8 +15,8 @@ use crate::plan::Plan;
 use crate::predict::prediction;
 use crate::prepare::ranges::ranges;
 use crate::prepare::{
-    Explanation, EyeMap, Planned, Prepared, load_measured, plan_alone, prepare, same_splats, settled, splats_serve,
-    turned,
+    Explanation, EyeMap, Planned, Prepared, is_brighter, load_measured, plan_alone, prepare, same_splats, settled,
+    splats_serve, turned,
 };
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
 use crate::technique::{Checkpoint, Fold, Kept, Session, Sets};
@@ -151,8 +151,9 @@ impl Left {
             Some(Made { scene: before, loaded, planned, leaves, uncut }) if turned(&before, scene) => {
                 Served { made: Some((loaded, Some(planned))), leaves, uncut }
             }
-            Some(Made { scene: before, loaded, uncut, .. }) if splats_serve(&before, scene, &loaded) => {
-                Served { made: Some((loaded, None)), uncut, ..Served::default() }
+            Some(Made { scene: before, loaded, uncut, leaves, .. }) if splats_serve(&before, scene, &loaded) => {
+                let leaves = if is_brighter(&before, scene) { leaves.of_lights() } else { Leaves::default() };
+                Served { made: Some((loaded, None)), uncut, leaves }
             }
             Some(made) if self.is_preview && made.loaded.cloud.bytes() <= max_memory / Self::SHARE => {
                 preview_of_part(made, scene).unwrap_or_default()
@@ -288,7 +289,7 @@ pub(crate) fn render_keeping(
     warnings.extend(drawn_anew(scene, &left.by, &plan.by));
     left.by.clone_from(&plan.by);
     let device = helper.as_ref().map(|helper| (helper, options.device_composites));
-    leaves.maps = leaves.maps.filter(|maps| maps.serve(plan));
+    leaves.maps = leaves.maps.filter(|maps| maps.serve(plan) || left.is_preview && maps.stand_for(plan));
     let frame = Frame::new(scene, &loaded, plan, progress).helped_by(device).following(leaves, remembers.is_some());
     frame.groups.replace(std::mem::take(&mut left.groups));
     let kept = (!left.is_still).then_some(&mut left.sets);

@@ -197,7 +197,7 @@ fn shape(
             let majorant = majorant(&field, bounds);
             (Shape::Field { field: Arc::new(field), bounds, majorant }, d.extinction)
         }
-        Source::Volume(VolumeSource { path, frame, transfer }) => {
+        Source::Volume(VolumeSource { path, frame, transfer, .. }) => {
             let FileData::Grid(grid) = read(scene, path, *frame, object.array.as_ref(), options)? else {
                 return Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file"));
             };

@@ -89,7 +89,7 @@ pub(crate) fn check_source(
         let path = paths.resolve(&at_source, path)?;
         let frame = raw.frame.unwrap_or(0).into();
         let transfer = check_transfer(at, raw, Beside::Extinction)?;
-        return Ok(Source::Volume(VolumeSource { path, frame, transfer }));
+        return Ok(Source::Volume(VolumeSource { path, frame, transfer, block: 1 }));
     }
     if let Some(implicit) = &raw.implicit {
         return check_implicit(&at_source, implicit).map(Source::Implicit);

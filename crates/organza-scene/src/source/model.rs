@@ -139,6 +139,8 @@ pub struct VolumeSource {
     pub frame: u64,
     /// Value → colour and extinction, 1/world unit (after the object's transform).
     pub transfer: TransferFunction,
+    /// Voxels along each side of a block that is taken as one: 1, but for previews.
+    pub block: usize,
 }
 
 /// The surface where an expression in x, y, z is zero; negative inside. Lengths are before the object's transform.

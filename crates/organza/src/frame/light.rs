@@ -4,7 +4,7 @@ use super::Frame;
 use crate::device;
 use crate::pass;
 use crate::plan::Plan;
-use crate::scene::{LightPoint, light_points};
+use crate::scene::{LightPoint, Technique, light_points};
 use crate::shadows::{EYE, ShadowTable, casting, eye, eye_params, shadow_error, thick_objects};
 use crate::{CostRecord, Error, cost as predicted, stage};
 use splat_core::shade::{LitBy, ShadeInput};
@@ -32,12 +32,23 @@ struct MadeAs {
     tables: Vec<Option<(tsm::Prediction, f32)>>,
     /// [`Plan::casters`].
     casters: Vec<Vec<bool>>,
+    /// Who draws each object, from its own data or as splats: light is remembered of splats that are drawn.
+    drawn: (Vec<Technique>, Vec<bool>),
 }
 
 impl Maps {
     /// Whether they are those of another plan for the same splats.
     pub(crate) fn serve(&self, plan: &Plan) -> bool {
         self.made_as == Self::made_as(plan)
+    }
+
+    /// Whether they have a shadow wherever another plan for the same splats has one, finer or coarser: good enough for a preview.
+    pub(crate) fn stand_for(&self, plan: &Plan) -> bool {
+        let other = Self::made_as(plan);
+        let is_there = |made: &MadeAs| made.tables.iter().map(Option::is_some).collect::<Vec<_>>();
+        is_there(&self.made_as) == is_there(&other)
+            && self.made_as.casters == other.casters
+            && self.made_as.drawn == other.drawn
     }
 
     /// The limit that the cells of each map ended at.
@@ -48,7 +59,7 @@ impl Maps {
     fn made_as(plan: &Plan) -> MadeAs {
         let tables = plan.shadow_tables.iter().chain(&plan.other_tables);
         let tables = tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect();
-        MadeAs { tables, casters: plan.casters.clone() }
+        MadeAs { tables, casters: plan.casters.clone(), drawn: (plan.by.clone(), plan.is_own.clone()) }
     }
 }
 

@@ -49,7 +49,7 @@ fn world_box(object: &SceneObject, context: &ObjectContext<'_>) -> Result<Option
             }
             _ => None,
         },
-        Source::Volume(VolumeSource { path, frame, transfer }) => match context.read_frame(path, *frame)? {
+        Source::Volume(VolumeSource { path, frame, transfer, .. }) => match context.read_frame(path, *frame)? {
             SourceData::Grid(grid) => {
                 around(&mut visible_ends(&grid, transfer, object.transform.scale, &object.clip).into_iter())
             }

@@ -5,11 +5,11 @@ use crate::{Error, RenderOptions};
 use convert::ColorScale;
 use field::SharedField;
 use read::{Loaded, Notes, ReadParams};
-use splat_core::{DAabb, MemoryAccount, Mesh, Progress, RawPoints, Reservation};
+use splat_core::{DAabb, Grid, MemoryAccount, Mesh, Progress, RawPoints, Reservation};
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use std::time::Instant;
 
 /// What was read of a file, what there is to say of it, and the memory that it takes as long as anybody has it from here.
@@ -17,6 +17,23 @@ type Read = (SourceData, Notes, Arc<Reservation>);
 
 /// The level set of scattered points, and its bounds.
 pub(super) type Fitted = (SharedField, DAabb);
+
+/// A volume of fewer voxels, and its memory.
+#[derive(Clone)]
+pub(super) struct Blocks {
+    pub(super) grid: Arc<Grid>,
+    /// It is given back with the volume.
+    pub(super) _held: Arc<Reservation>,
+}
+
+/// What such a volume is made of.
+#[derive(Clone)]
+struct MadeOfGrid {
+    whole: Weak<Grid>,
+    /// The value that stands for none, in bits.
+    nodata: Option<u32>,
+    block: usize,
+}
 
 /// What was made, beside what it was made of.
 type Made<K, V> = RefCell<Vec<(K, V)>>;
@@ -41,6 +58,8 @@ pub struct Files {
     pub(crate) stopped: Made<(Stop, Arc<Scene>), f64>,
     /// What lights see of parts of the scene.
     pub(crate) seen: Made<(ExtractSource, Scene), Arc<RawPoints>>,
+    /// Volumes of which blocks are taken as one voxel, beside what they were made of.
+    blocks: RefCell<Vec<(MadeOfGrid, Blocks)>>,
     /// Most bytes that parts of the scene took while lights looked at them.
     pub(crate) most: Cell<u64>,
     /// Repairs of the files, and warnings about them.
@@ -61,6 +80,7 @@ impl Default for Files {
             fitted: RefCell::default(),
             stopped: RefCell::default(),
             seen: RefCell::default(),
+            blocks: RefCell::default(),
             most: Cell::default(),
             mended: RefCell::default(),
             scales: RefCell::default(),
@@ -265,6 +285,26 @@ impl Files {
         Ok((data, notes, held.into()))
     }
 
+    /// A volume of which blocks are taken as one voxel, or makes it. Of volumes that nobody has any more those that were made are dropped.
+    pub(super) fn blocks(
+        &self,
+        whole: &Arc<Grid>,
+        nodata: Option<f32>,
+        block: usize,
+        make: impl FnOnce() -> Result<Blocks, Error>,
+    ) -> Result<Arc<Grid>, Error> {
+        let nodata = nodata.map(f32::to_bits);
+        self.blocks.borrow_mut().retain(|(of, _)| of.whole.strong_count() > 0);
+        let is_same =
+            |of: &MadeOfGrid| of.whole.as_ptr() == Arc::as_ptr(whole) && of.nodata == nodata && of.block == block;
+        if let Some((_, known)) = self.blocks.borrow().iter().find(|(of, _)| is_same(of)) {
+            return Ok(known.grid.clone());
+        }
+        let made = make()?;
+        self.blocks.borrow_mut().push((MadeOfGrid { whole: Arc::downgrade(whole), nodata, block }, made.clone()));
+        Ok(made.grid)
+    }
+
     /// Seconds that reading took since this was asked last.
     pub(super) fn take_seconds(&self) -> f64 {
         self.seconds.take()
@@ -284,7 +324,8 @@ impl Files {
     pub(crate) fn bytes(&self) -> u64 {
         let read: u64 = self.read.borrow().values().map(|(_, read)| read.0.bytes()).sum();
         let seen: u64 = self.seen.borrow().iter().map(|(_, points)| points.bytes()).sum();
-        read + seen + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
+        let blocks: u64 = self.blocks.borrow().iter().map(|(_, made)| made.grid.bytes()).sum();
+        read + seen + blocks + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }
 }
 

@@ -92,8 +92,8 @@ fn outline<'i>(input: &'i Input<'i>) -> (Outline<'i>, Similarity) {
         Input::Matter(_, points, params) => {
             return of_points(input, points, || raw_to_matter(points, params, None).map(|(cloud, _)| cloud));
         }
-        Input::Volume(grid, transfer, params) => {
-            Outline::Places(visible_ends(grid, transfer, params.splat.transform.scale, &params.clip))
+        Input::Volume(shown, transfer, params) => {
+            Outline::Places(visible_ends(&shown.grid, transfer, params.splat.transform.scale, &params.clip))
         }
         Input::Surface(_, bounds, _, isosurface) => {
             let ends = isosurface.as_ref().map_or_else(Vec::new, |it| surface_ends(&it.grid, f64::from(it.level)));

@@ -1,6 +1,6 @@
 //! The input of an object: files read, formulas parsed, with the parameters of the conversion.
 
-use super::files::{Fitted, once};
+use super::files::{Blocks, Fitted, once};
 use super::object_context::ObjectContext;
 use super::painted::{self, ShownMesh};
 use crate::Error;
@@ -21,13 +21,20 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
+/// The lattice of a volume that is drawn.
+pub(super) struct ShownGrid {
+    pub(super) grid: Arc<Grid>,
+    /// Voxels of the file that one of its voxels stands for.
+    pub(super) stands_for: f64,
+}
+
 /// The data of one object with the parameters of its conversion.
 pub(super) enum Input<'a> {
     /// With the name of its source.
     Mesh(String, ShownMesh, MeshParams),
     Points(&'a Path, Arc<RawPoints>, SurfelParams),
     Matter(&'a Path, Arc<RawPoints>, MatterParams),
-    Volume(Arc<Grid>, Cow<'a, TransferFunction>, VolumeParams),
+    Volume(ShownGrid, Cow<'a, TransferFunction>, VolumeParams),
     /// The zero set of a field in a box; of an isosurface that nothing clips with its volume.
     Surface(SharedField, DAabb, MeshParams, Option<Isosurface>),
     Density(SharedField, DAabb, DensityParams),
@@ -42,7 +49,7 @@ impl Input<'_> {
         let (bytes, holders) = match self {
             Self::Mesh(_, mesh, _) => (mesh.bytes(), Arc::strong_count(&mesh.mesh)),
             Self::Points(_, points, _) | Self::Matter(_, points, _) => (points.bytes(), Arc::strong_count(points)),
-            Self::Volume(grid, ..) => (grid.bytes(), Arc::strong_count(grid)),
+            Self::Volume(shown, ..) => (shown.grid.bytes(), Arc::strong_count(&shown.grid)),
             _ => (0, 1),
         };
         [bytes, if holders > 1 { 0 } else { bytes }]
@@ -178,11 +185,14 @@ pub(super) fn input<'a>(object: &'a SceneObject, context: &ObjectContext<'_>) ->
             let points = source.points.clone().unwrap_or_default();
             raw_points("what a light sees".as_ref(), points, object, splat, context)?
         }
-        Source::Volume(VolumeSource { path, frame, transfer }) => {
-            let (grid, transfer) = without_gaps(read_grid(path, *frame, context)?, transfer);
+        Source::Volume(VolumeSource { path, frame, transfer, block }) => {
+            // A spacing that the scene states is kept.
+            let block = if object.spacing.is_some() { 1 } else { *block };
+            let ShownGrid { grid, stands_for } = read_blocks(path, *frame, block, context)?;
+            let (grid, transfer) = without_gaps(grid, transfer);
             let at = |spacing: f64| convert::resampled(&grid, spacing / splat.transform.scale, &splat).map(Arc::new);
             let grid = object.spacing.map_or_else(|| Ok(grid.clone()), at)?;
-            Input::Volume(grid, transfer, context.volume_params(splat))
+            Input::Volume(ShownGrid { grid, stands_for }, transfer, context.volume_params(splat))
         }
         Source::Implicit(_) | Source::Isosurface(_) | Source::LevelSet(_) | Source::Combined(_) => {
             let (solid, isosurface) = solid(&object.source, object, context)?;
@@ -500,10 +510,33 @@ fn with_first_value(grid: Arc<Grid>, transfer: &TransferFunction) -> Arc<Grid> {
     convert::gaps_of_value(&grid, first).map_or(grid, Arc::new)
 }
 
+/// Blocks along a side of a volume that a preview keeps at least.
+const LEAST_BLOCKS: usize = 32;
+
+/// A volume of which blocks with so many voxels along each side are taken as one voxel; fewer where the volume is small.
+fn read_blocks(path: &Path, frame: u64, block: usize, context: &ObjectContext<'_>) -> Result<ShownGrid, Error> {
+    if block == 1 {
+        return Ok(ShownGrid { grid: read_grid(path, frame, context)?, stands_for: 1.0 });
+    }
+    let SourceData::Grid(whole) = context.read_frame(path, frame)? else { return Err(no_volume(path)) };
+    let make = || {
+        let grid = with_known_values(whole.clone(), path, context)?.coarsened(block, LEAST_BLOCKS);
+        let held = context.files.memory(context.options).take(&crate::printable(path), grid.bytes());
+        Ok(Blocks { grid: grid.into(), _held: held.map_err(Error::Limit)?.into() })
+    };
+    let grid = context.files.blocks(&whole, context.nodata(), block, make)?;
+    let stands_for = whole.values.len() as f64 / grid.values.len() as f64;
+    Ok(ShownGrid { grid, stands_for })
+}
+
+fn no_volume(path: &Path) -> Error {
+    Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")
+}
+
 fn read_grid(path: &Path, frame: u64, context: &ObjectContext<'_>) -> Result<Arc<Grid>, Error> {
     match context.read_frame(path, frame)? {
         SourceData::Grid(grid) => with_known_values(grid, path, context),
-        _ => Err(Error::wrong_kind(path, "a volume", "use `mesh = ` or `points = ` for this file")),
+        _ => Err(no_volume(path)),
     }
 }
 

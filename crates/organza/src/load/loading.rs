@@ -75,6 +75,18 @@ impl<'a> Loading<'a> {
         self.visible().zip(prepared).map(object_statistics).collect()
     }
 
+    /// The share of each object's splats that is drawn, by its rank: those of a volume of fewer voxels stand for more already.
+    pub(super) fn shares(&self, prepared: &[Prepared<'_>]) -> Vec<f64> {
+        let share = self.scene.render.splat_share;
+        let mut shares = vec![share; self.scene.objects.len()];
+        for ((id, _), object) in self.visible().zip(prepared) {
+            if let Input::Volume(shown, ..) = &object.input {
+                shares[id] = (share * shown.stands_for).min(1.0);
+            }
+        }
+        shares
+    }
+
     /// Splats to be made; refuses those that do not fit.
     pub(super) fn counts(
         &self,

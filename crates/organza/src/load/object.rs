@@ -101,7 +101,7 @@ fn predict(input: &Input<'_>) -> Result<Prediction, ConvertError> {
         Input::Mesh(_, mesh, params) => cost::mesh(mesh, params),
         Input::Points(_, points, params) => cost::raw_points(points, params),
         Input::Matter(_, points, params) => cost::raw_matter(points, params),
-        Input::Volume(grid, transfer, params) => cost::volume(grid, transfer, params),
+        Input::Volume(shown, transfer, params) => cost::volume(&shown.grid, transfer, params),
         Input::Surface(field, bounds, params, _) => cost::surface(field.as_ref(), *bounds, params),
         Input::Density(field, bounds, params) => cost::density(field.as_ref(), *bounds, params),
         Input::Procedural(shape, spacing, params) => cost::procedural(shape, *spacing, params),
@@ -178,9 +178,9 @@ pub(super) fn convert(
             let made = convert::raw_to_matter(points, &MatterParams { splat, ..params.clone() }, Some(progress));
             made.inspect(|(_, report)| context.files.note(path, report.said())).map(|c| c.0)
         }
-        Input::Volume(grid, transfer, params) => {
+        Input::Volume(shown, transfer, params) => {
             let params = VolumeParams { splat, ..params.clone() };
-            convert::volume_to_points(grid, transfer, &params, Some(progress)).map(|c| c.0)
+            convert::volume_to_points(&shown.grid, transfer, &params, Some(progress)).map(|c| c.0)
         }
         Input::Surface(field, bounds, params, _) => {
             let params = MeshParams { splat, ..params.clone() };

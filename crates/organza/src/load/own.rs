@@ -282,7 +282,7 @@ fn data(
             };
             Some((Body::Surface { field: field.clone(), inside, spacing, step }, bounds, spacing))
         }
-        Input::Volume(grid, transfer, params) => Some(volume(grid, transfer, params, context)?),
+        Input::Volume(shown, transfer, params) => Some(volume(&shown.grid, transfer, params, context)?),
         Input::Procedural(shape, spacing, params) => {
             let (grid, transfer) = procedural(shape, *spacing, &params.splat, context)?;
             cells(grid.into(), transfer, (params.normals, &params.clip))

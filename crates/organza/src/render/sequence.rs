@@ -222,6 +222,35 @@ mod tests {
         }
     }
 
+    #[test]
+    fn shadow_maps_serve_lights_that_are_brighter_with_the_same_bits() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        // Each follows the one before it. Maps are planned by what light shows, in previews for all views.
+        let states: [(&[&str], bool); 6] = [
+            (&[], false),
+            (&["light.sun.irradiance=[0.8, 0.9, 1]"], true),
+            (&["light.lamp.intensity=[21, 18, 16]", "camera.position=[1, 1, 4]"], true),
+            (&["light.lamp.intensity=[21, 18, 16]", "render.exposure=1"], true),
+            (&["light.lamp.position=[2, 3.5, 4]", "light.lamp.intensity=[21, 18, 16]"], false),
+            (&["light.lamp.position=[2, 3.5, 4]", "light.lamp.shadow=false"], false),
+        ];
+        let mut sequence = Sequence::default();
+        let mut previews = Sequence::of_previews(Files::default());
+        for (changes, serves) in states {
+            let scene = Scene { frames: Some(2), ..changed(changes) };
+            let kept = sequence.render(&scene, &options, &progress).unwrap();
+            let alone = render(&scene, &options, &progress).unwrap();
+            assert_eq!((&kept.layers, &kept.plan), (&alone.layers, &alone.plan), "{changes:?}");
+            let has_map = |render: &Render| has_pass(render, crate::pass::SHADOW_MAP);
+            // Another exposure asks for maps of another tolerance.
+            let is_exposed = changes.contains(&"render.exposure=1");
+            assert_eq!(!has_map(&kept), serves && !is_exposed, "{changes:?}");
+            let preview = previews.render(&scene, &options, &progress).unwrap();
+            assert_eq!(!has_map(&preview), serves, "{changes:?}");
+        }
+    }
+
     /// Radiance by which pictures of the same splats differ at most, whatever these are counted from.
     const ALIKE: f32 = 2e-3;
 

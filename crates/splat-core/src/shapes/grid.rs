@@ -2,6 +2,7 @@
 
 use crate::Error;
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// A volume of scalars on a regular lattice, x fastest.
@@ -44,6 +45,45 @@ impl Grid {
     /// Length of the shortest step along a side of a cell.
     pub fn shortest_step(&self) -> f64 {
         [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis].iter().fold(f64::INFINITY, |s, a| s.min(a.length()))
+    }
+
+    /// A lattice of fewer points for previews: each has the mean of a block of `side` points along each axis, or of as many as leave `least` blocks along
+    /// it. Points without a value (NaN) have no share in a mean, and a block of such points has none. The last block of an axis may have fewer points.
+    ///
+    /// ```
+    /// use splat_core::{Grid, glam::{DMat3, DVec3}};
+    /// let values = (0..64).map(|place| (place % 4) as f32).collect();
+    /// let grid = Grid { origin: DVec3::ZERO, axes: DMat3::IDENTITY, dims: [4, 4, 4], values };
+    /// let coarse = grid.coarsened(2, 1);
+    /// assert_eq!((coarse.dims, coarse.origin), ([2, 2, 2], DVec3::splat(0.5)));
+    /// assert_eq!(coarse.values, [0.5, 2.5].repeat(4));
+    /// ```
+    pub fn coarsened(&self, side: usize, least: usize) -> Self {
+        let sides = self.dims.map(|count| side.min(count / least.max(1)).max(1));
+        let steps = DVec3::from_array(sides.map(|side| side as f64));
+        let dims = std::array::from_fn(|axis| self.dims[axis].div_ceil(sides[axis]));
+        let mut values = vec![0.0; dims.iter().product()];
+        let row_of_blocks = |counts: &mut Vec<u32>, (row, sums): (usize, &mut [f32])| {
+            counts.clear();
+            counts.resize(sums.len(), 0);
+            let first = [row % dims[1] * sides[1], row / dims[1] * sides[2]];
+            for k in first[1]..(first[1] + sides[2]).min(self.dims[2]) {
+                for j in first[0]..(first[0] + sides[1]).min(self.dims[1]) {
+                    let start = (k * self.dims[1] + j) * self.dims[0];
+                    let blocks = self.values[start..start + self.dims[0]].chunks(sides[0]);
+                    for ((sum, count), block) in sums.iter_mut().zip(counts.iter_mut()).zip(blocks) {
+                        for value in block.iter().filter(|value| !value.is_nan()) {
+                            *sum += value;
+                            *count += 1;
+                        }
+                    }
+                }
+            }
+            sums.iter_mut().zip(counts).for_each(|(sum, count)| *sum /= *count as f32);
+        };
+        values.par_chunks_mut(dims[0].max(1)).enumerate().for_each_init(Vec::new, row_of_blocks);
+        let origin = self.origin + self.axes * ((steps - 1.0) / 2.0);
+        Self { origin, axes: self.axes * DMat3::from_diagonal(steps), dims, values }
     }
 
     /// Checks dimensions against the values, finite values and a lattice that spans space.

@@ -51,6 +51,11 @@ impl Cloud {
     /// assert_eq!(fewer.cross_section[0], 10.0 * cloud.cross_section[0]);
     /// ```
     pub fn fewer(&self, share: f64) -> Cloud {
+        self.fewer_of_each(|_| share)
+    }
+
+    /// The same with a share for each object, by its rank.
+    pub fn fewer_of_each(&self, share: impl Fn(usize) -> f64) -> Cloud {
         let is_whole = |i: usize| self.gaussian.get(i).is_some_and(|gaussian| *gaussian != Gaussians::NONE);
         let mut objects: Vec<OfObject> = Vec::new();
         for (_, object) in self.object.iter().enumerate().filter(|(i, _)| !is_whole(*i)) {
@@ -60,8 +65,8 @@ impl Cloud {
             }
             objects[object].count += 1;
         }
-        for object in &mut objects {
-            let kept = libm::ceil((object.count as f64 * share).max(LEAST)) as u64;
+        for (rank, object) in objects.iter_mut().enumerate() {
+            let kept = libm::ceil((object.count as f64 * share(rank)).max(LEAST)) as u64;
             object.kept = kept.min(object.count);
         }
         let mut kept: Vec<u32> = Vec::new();
