@@ -14,6 +14,7 @@ pub(crate) mod object;
 mod object_context;
 pub(crate) mod own;
 mod painted;
+mod previews;
 
 use crate::cost::{Count, before_conversion};
 use crate::form::{Form, PlannedObject};
@@ -25,11 +26,13 @@ use convert::ColorScale;
 pub(crate) use fit::placed;
 use glam::DVec3;
 use images::Images;
-use loading::Loading;
+use loading::{Converting, Loading};
 use normalize::normalize;
 use object::Prepared;
 pub(crate) use object_context::{BYTES_PER_LATTICE_POINT, BYTES_PER_SPLAT};
 use own::Own;
+use previews::Converted;
+
 use splat_core::shade::Census;
 use splat_core::{Camera, Clip, Cloud, DAabb, FootprintStack, Material, Object, Shading, SplatKind};
 use std::cmp::Ordering;
@@ -334,7 +337,7 @@ impl Inputs<'_> {
         }
         let mut splats = loading.counts(&prepared, &planned)?;
         let convertible = prepared.iter().map(|p| p.prediction.splats).collect();
-        let shares = loading.shares(&prepared);
+        let mut shares = loading.shares(&prepared);
         let materials = materials(scene, &prepared);
         let points = lights.iter().map(SceneLight::count).sum();
         let work = before_conversion(scene, &splats, &planned, points, beside);
@@ -344,8 +347,13 @@ impl Inputs<'_> {
         let mut cloud = Cloud::default();
         if converted > 0 || natives.is_empty() {
             cloud = cost.measure(pass::CONVERT, |stage| {
-                let cloud = merge(loading.clouds(prepared, &planned, &natives, &mut splats, &mut warnings)?);
-                stage.items_in = converted as u64;
+                let Converting { clouds, is_known } =
+                    loading.clouds(prepared, &planned, &natives, &mut splats, &mut warnings)?;
+                let known = is_known.iter().filter(|known| **known).count();
+                // They are as few as are drawn.
+                shares.iter_mut().zip(is_known).filter(|(_, known)| *known).for_each(|(share, _)| *share = 1.0);
+                let cloud = merge(clouds);
+                stage.items_in = (converted - known) as u64;
                 stage.items_out = cloud.len() as u64;
                 stage.bytes = cloud.bytes();
                 Ok::<_, Error>(cloud)
@@ -364,6 +372,11 @@ impl Inputs<'_> {
             count_anew(&mut splats, &cloud, &objects);
         }
         cloud.validate().map_err(|e| out_of_range(scene, &cloud, e))?;
+        files.keep_converted(|| {
+            let mut of_objects = vec![None; scene.objects.len()];
+            loading.visible().zip(&planned).for_each(|((rank, _), plan)| of_objects[rank] = Some(plan.clone()));
+            Converted { scene: scene.clone(), planned: of_objects, cloud: cloud.clone(), exponent }
+        });
         warnings.extend(unseen(scene, &cloud, &materials, natives.is_empty()));
         Ok(Loaded {
             cloud,

@@ -1,5 +1,6 @@
 //! Cache of the files' data, shared by all objects and frames: a file is read once.
 
+use super::previews::Converted;
 use crate::scene::{ExtractSource, Scene, SourceData, Stop};
 use crate::{Error, RenderOptions};
 use convert::ColorScale;
@@ -60,6 +61,8 @@ pub struct Files {
     pub(crate) seen: Made<(ExtractSource, Scene), Arc<RawPoints>>,
     /// Volumes of which blocks are taken as one voxel, beside what they were made of.
     blocks: RefCell<Vec<(MadeOfGrid, Blocks)>>,
+    /// What was converted for the last preview; `None` where there are no previews.
+    converted: RefCell<Option<Option<Converted>>>,
     /// Most bytes that parts of the scene took while lights looked at them.
     pub(crate) most: Cell<u64>,
     /// Repairs of the files, and warnings about them.
@@ -81,6 +84,7 @@ impl Default for Files {
             stopped: RefCell::default(),
             seen: RefCell::default(),
             blocks: RefCell::default(),
+            converted: RefCell::default(),
             most: Cell::default(),
             mended: RefCell::default(),
             scales: RefCell::default(),
@@ -305,6 +309,29 @@ impl Files {
         Ok(made.grid)
     }
 
+    /// The same files for previews or not; nothing is converted for previews yet.
+    pub(crate) fn for_previews(self, are_previews: bool) -> Self {
+        self.converted.replace(are_previews.then_some(None));
+        self
+    }
+
+    /// Whether they are read for previews.
+    pub(super) fn are_for_previews(&self) -> bool {
+        self.converted.borrow().is_some()
+    }
+
+    /// Takes what was converted for the last preview.
+    pub(super) fn take_converted(&self) -> Option<Converted> {
+        self.converted.borrow_mut().as_mut().and_then(Option::take)
+    }
+
+    /// Keeps what was converted for a preview.
+    pub(super) fn keep_converted(&self, converted: impl FnOnce() -> Converted) {
+        if let Some(kept) = &mut *self.converted.borrow_mut() {
+            *kept = Some(converted());
+        }
+    }
+
     /// Seconds that reading took since this was asked last.
     pub(super) fn take_seconds(&self) -> f64 {
         self.seconds.take()
@@ -312,7 +339,7 @@ impl Files {
 
     /// None any more, on the same account.
     pub(crate) fn emptied(&self) -> Self {
-        Self { memory: self.memory.clone(), ..Self::default() }
+        Self { memory: self.memory.clone(), ..Self::default() }.for_previews(self.are_for_previews())
     }
 
     /// Most bytes that files and images took at a time, while they were read too.
@@ -325,7 +352,8 @@ impl Files {
         let read: u64 = self.read.borrow().values().map(|(_, read)| read.0.bytes()).sum();
         let seen: u64 = self.seen.borrow().iter().map(|(_, points)| points.bytes()).sum();
         let blocks: u64 = self.blocks.borrow().iter().map(|(_, made)| made.grid.bytes()).sum();
-        read + seen + blocks + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
+        let converted = self.converted.borrow().iter().flatten().map(|converted| converted.cloud.bytes()).sum::<u64>();
+        read + seen + blocks + converted + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }
 }
 

@@ -12,6 +12,13 @@ use crate::statistics::ObjectStatistics;
 use crate::{Error, SplatCount, stage};
 use splat_core::{Cloud, Exceeded};
 
+/// The splats of objects.
+pub(super) struct Converting {
+    pub(super) clouds: Vec<Cloud>,
+    /// Which objects of the scene have the splats of the preview before, as few as are drawn.
+    pub(super) is_known: Vec<bool>,
+}
+
 /// What loading reads.
 #[derive(Clone, Copy)]
 pub(super) struct Loading<'a> {
@@ -140,7 +147,9 @@ impl<'a> Loading<'a> {
         natives: &[Own],
         splats: &mut [SplatCount],
         warnings: &mut Vec<String>,
-    ) -> Result<Vec<Cloud>, Error> {
+    ) -> Result<Converting, Error> {
+        let before = self.context.files.take_converted();
+        let mut is_known = vec![false; self.scene.objects.len()];
         let mut clouds: Vec<Cloud> = Vec::new();
         let mut used: u64 = natives.iter().map(Own::bytes).sum();
         let mut made = 0;
@@ -151,9 +160,16 @@ impl<'a> Loading<'a> {
             if plan.splats.is_none() {
                 continue;
             }
-            self.context.progress.begin(&cost::converting(&object.name));
-            let cloud = object::convert(&p, native, &self.context(id, used, made), warnings);
-            let cloud = cloud.map_err(|e| self.named(object, e))?;
+            let known = before.as_ref().and_then(|before| before.cloud(self.scene, id, plan));
+            is_known[id] = known.is_some();
+            let cloud = known.map_or_else(
+                || {
+                    self.context.progress.begin(&cost::converting(&object.name));
+                    let cloud = object::convert(&p, native, &self.context(id, used, made), warnings);
+                    cloud.map_err(|e| self.named(object, e))
+                },
+                Ok,
+            )?;
             if cloud.is_empty() {
                 warnings.push(format!("object '{}' has no splats", crate::shown(&object.name)));
             }
@@ -161,7 +177,7 @@ impl<'a> Loading<'a> {
             (used, made) = (used + cloud.bytes(), made + count.made);
             clouds.push(cloud);
         }
-        Ok(clouds)
+        Ok(Converting { clouds, is_known })
     }
 }
 
