@@ -11,6 +11,7 @@ pub(crate) mod lattice;
 pub(crate) mod lines;
 pub(crate) mod params;
 pub(crate) mod pixel;
+pub(crate) mod preintegrated;
 pub(crate) mod reason;
 pub mod sections;
 pub(crate) mod shadows;

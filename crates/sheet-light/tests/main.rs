@@ -14,6 +14,7 @@ mod invariances;
 mod modes;
 mod panes;
 mod precision;
+mod preintegrated;
 mod skipped;
 mod splats;
 mod strides;

@@ -55,6 +55,8 @@ pub(crate) struct SheetLines<'a> {
     pub(crate) slopes: &'a Slopes,
     pub(crate) slabs: &'a Slabs,
     pub(crate) crossings: &'a Crossings,
+    /// Slabs to each side of one that values in it are told from.
+    pub(crate) beside: u32,
 }
 
 impl Ribbon {
@@ -195,8 +197,8 @@ impl SheetLines<'_> {
         let mut begin = BATCH;
         let mut end = 0;
         for slab in 0..BATCH {
-            let before = self.slabs.face((first + slab).max(1) - 1);
-            let behind = self.slabs.face(first + slab + 2);
+            let before = self.slabs.face((first + slab).saturating_sub(self.beside));
+            let behind = self.slabs.face(first + slab + 1 + self.beside);
             if near < behind && far > before {
                 begin = begin.min(slab);
                 end = slab + 1;

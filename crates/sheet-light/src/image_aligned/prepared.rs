@@ -17,6 +17,7 @@ use crate::shared::lattice::Lattice;
 use crate::shared::lattice::neighbours::Receivers;
 use crate::shared::lattice::rays::LatticeRays;
 use crate::shared::params::{Classify, Reconstruction};
+use crate::shared::preintegrated::Preintegrated;
 use crate::shared::sections::SectionTable;
 use crate::shared::shadows::Shadows;
 use crate::shared::slabs::Slabs;
@@ -44,6 +45,8 @@ pub(crate) struct Prepared<'a> {
     half: bool,
     pub(crate) classify: Classify,
     pub(crate) classifier: Classifier,
+    /// Where all values that a ray meets in a slab are classified.
+    pub(crate) preintegrated: Option<Preintegrated>,
     pub(crate) rays: LatticeRays,
     pub(crate) voxels: Voxels,
     pub(crate) shadows: Option<Shadows<'a>>,
@@ -102,7 +105,9 @@ impl<'a> Prepared<'a> {
         match params.reconstruction {
             Reconstruction::Splat => {
                 slabs_beside_eye = lacking(&volume, camera, slabs, without_rim.reach);
-                let reach = without_rim.lattice_reach(camera, slabs, compares);
+                // Sheets beside the volume, too, tell how values go on at its faces.
+                let further = compares || params.classify == Classify::Preintegrated;
+                let reach = without_rim.lattice_reach(camera, slabs, further);
                 lattice = Lattice::new(grid, volume.packing, reach);
                 viewed = without_rim.with_rim(lattice.rim);
                 let near = viewed.near(camera, slabs, &params.kernel, compares, slabs_beside_eye.is_some());
@@ -111,7 +116,8 @@ impl<'a> Prepared<'a> {
                 gathered = None;
             }
             Reconstruction::Gather(kernel) => {
-                let near = kernel.near(without_rim.steps_to_neighbours(camera, slabs, compares));
+                let apart = if params.classify == Classify::Preintegrated { 2.0 } else { 1.0 };
+                let near = kernel.near(without_rim.steps_to_neighbours(camera, slabs, apart, compares));
                 let found;
                 (found, voxels) = Gathered::new(&volume, kernel, transfer, base, &near);
                 lattice = Lattice::new(grid, volume.packing, RIM);
@@ -135,6 +141,8 @@ impl<'a> Prepared<'a> {
             half: params.is_half(),
             classify: params.classify,
             classifier: Classifier::new(transfer, volume.extinction_scale, base),
+            preintegrated: (params.classify == Classify::Preintegrated)
+                .then(|| Preintegrated::new(transfer, volume.extinction_scale, base)),
             rays: LatticeRays::new(&volume, camera, slabs.origin),
             footprint: camera.is_orthographic().then(|| viewed.footprint(camera.focal_px())),
             viewed,
@@ -149,6 +157,18 @@ impl<'a> Prepared<'a> {
             segments,
             base,
         }
+    }
+
+    /// Whether values beside a slab are told from its neighbours alone, because further sheets may lack kernels, which lie behind the eye.
+    #[inline(always)]
+    pub(crate) fn is_lacking(&self, slab: u32) -> bool {
+        self.lacking.as_ref().is_some_and(|lacking| slab < lacking.end + 2)
+    }
+
+    /// Slabs to each side of one that values in it are told from.
+    #[inline(always)]
+    pub(crate) fn beside(&self) -> u32 {
+        if self.preintegrated.is_some() { 2 } else { 1 }
     }
 
     pub(crate) fn receivers(&self) -> Receivers<'_> {

@@ -14,7 +14,7 @@ use crate::shared::slabs::Slabs;
 use crate::{Error, Params, SheetInput, Volume};
 use splat_core::glam::{DVec3, Vec3};
 use splat_core::shade::{Point, arriving};
-use splat_core::{Footprint, Receiver, SplatKind};
+use splat_core::{Footprint, Receiver, Shading, SplatKind, TransferFunction};
 
 /// What it draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +47,8 @@ struct Sheets {
     classes: Vec<[f64; 4]>,
     /// Where each ray is inside.
     crossings: Vec<[f64; 2]>,
+    /// The slab behind those that lack kernels behind the eye; 0 where none does.
+    lacking: u32,
     /// The lattice that pixels read, where sheets are gathered.
     lattice: Option<Exact>,
     size: [usize; 2],
@@ -116,6 +118,7 @@ impl Sheets {
             depths: vec![0.0; n],
             classes: vec![[0.0; 4]; if params.classify == Classify::Before { n } else { 0 }],
             crossings: pixels.map(|pixel| crossing(ray(pixel))).collect(),
+            lacking: 0,
             lattice: None,
             size,
         };
@@ -126,7 +129,8 @@ impl Sheets {
             return sheets;
         }
         let viewed = Viewed::new(volume, camera, slabs, params, slant);
-        let reach = viewed.lattice_reach(camera, slabs, params.compares_sheets(volume));
+        let further = params.compares_sheets(volume) || params.classify == Classify::Preintegrated;
+        let reach = viewed.lattice_reach(camera, slabs, further);
         let lattice = Lattice::new(volume.grid, volume.packing, reach);
         let viewed = viewed.with_rim(lattice.rim);
         let [nx, ny, nz] = lattice.dims;
@@ -142,7 +146,9 @@ impl Sheets {
             };
             sheets.splat(&viewed, params, slabs, &voxel);
         }
-        for slab in lacking(volume, camera, slabs, viewed.reach).into_iter().flatten() {
+        let lacking = lacking(volume, camera, slabs, viewed.reach).unwrap_or(0..0);
+        sheets.lacking = lacking.end;
+        for slab in lacking {
             sheets.mend(slab);
         }
         sheets
@@ -234,6 +240,41 @@ impl Sheets {
         (extinction / self.weights[sheet], colors.map(|c| (c / extinction.max(f64::MIN_POSITIVE)) as f32))
     }
 
+    /// What lies between two depths in a slab: its halves, the front attenuating the back. `factor` makes an optical depth of an extinction over a unit of depth.
+    fn integrated(&self, volume: &Volume<'_>, slab: u32, pixel: usize, depths: [f64; 2], factor: f64) -> Part {
+        let [near, far] = depths;
+        let center = (f64::from(slab) + 0.5) * self.slabs.width;
+        let here = self.value(slab, pixel).unwrap_or(0.0);
+        let beside = |steps: i32| self.value(slab.saturating_add_signed(steps), pixel);
+        let face = |way: i32| {
+            let Some(next) = beside(way) else { return here };
+            let far = if self.is_lacking(slab) { None } else { beside(2 * way) };
+            let bend = far.zip(beside(-way)).map_or(0.0, |(far, other)| (here + next - far - other) / 16.0);
+            (0.5 * (here + next) + bend).clamp(here.min(next), here.max(next))
+        };
+        let value = |depth: f64| {
+            let behind = (depth - center) / self.slabs.width;
+            here + 2.0 * behind.abs() * (face(if behind < 0.0 { -1 } else { 1 }) - here)
+        };
+        let middle = center.clamp(near, far);
+        let [front, back] =
+            [[near, middle], [middle, far]].map(|ends| HalfPart::new(volume.transfer, ends, ends.map(value)));
+        let opacity = |depth: f64| -libm::expm1(-depth * factor);
+        let weights = [opacity(front.depth), libm::exp(-front.depth * factor) * opacity(back.depth)];
+        let share = weights[1] / (weights[0] + weights[1]).max(f64::MIN_POSITIVE);
+        let mix = |front: f64, back: f64| front + share * (back - front);
+        Part {
+            extinction: (front.depth + back.depth) / (far - near),
+            color: [0, 1, 2].map(|c| mix(front.color[c], back.color[c]) as f32),
+            middle: mix(front.middle, back.middle),
+        }
+    }
+
+    /// Whether kernels near a slab lie behind the eye.
+    fn is_lacking(&self, slab: u32) -> bool {
+        slab < self.lacking + 2 && self.lacking > 0
+    }
+
     /// Where a ray is inside, within a slab.
     fn inside(&self, slabs: &Slabs, slab: u32, pixel: usize) -> Option<[f64; 2]> {
         let [near, far] = self.crossings[pixel];
@@ -257,21 +298,32 @@ impl Sheets {
         let (Some(value), Some([near, far])) = (self.value(own_slab, pixel), self.inside(slabs, slab, pixel)) else {
             return nothing;
         };
+        let x = (pixel % self.size[0]) as f64 + 0.5;
+        let y = (pixel / self.size[0]) as f64 + 0.5;
+        let (from, along) = input.camera.view_ray(x, y);
         let [begin, end] = self.inside(&self.slabs, own_slab, pixel).unwrap_or([near, far]);
         let behind = 0.5 * (begin + end) / self.slabs.width - (f64::from(own_slab) + 0.5);
         let beside = if behind < 0.0 { own_slab - 1 } else { own_slab + 1 };
         let value = value + behind.abs() * (self.value(beside, pixel).unwrap_or(value) - value);
-        let (class, color) = self.class(volume, own_slab, pixel, value);
+        let mut middle = 0.5 * (begin + end);
+        let (class, color) = if params.classify == Classify::Preintegrated {
+            let factor = volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]) * along.length();
+            let part = self.integrated(volume, own_slab, pixel, [near, far], factor);
+            // What is lit is lit once for the whole of the volume's own slab.
+            let lit = if volume.material.shading == Shading::Unlit { [near, far] } else { [begin, end] };
+            let lit = self.integrated(volume, own_slab, pixel, lit, factor);
+            middle = lit.middle;
+            (part.extinction, lit.color)
+        } else {
+            self.class(volume, own_slab, pixel, value)
+        };
         if class == 0.0 {
             return nothing;
         }
-        let x = (pixel % self.size[0]) as f64 + 0.5;
-        let y = (pixel / self.size[0]) as f64 + 0.5;
-        let (from, along) = input.camera.view_ray(x, y);
         let extinction = class * volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]);
         let tau = extinction * (far - near) * along.length();
         let viewed = Viewed::new(volume, input.camera, &self.slabs, params, slant);
-        let depth = slabs.origin + 0.5 * (begin + end) - slant.offset(from.x, from.y);
+        let depth = slabs.origin + middle - slant.offset(from.x, from.y);
         let axes = input.camera.axes;
         let world = |v: DVec3| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
         let position = input.camera.position + world(from + along * depth);
@@ -335,6 +387,68 @@ fn radiance(input: &SheetInput<'_>, volume: &Volume<'_>, point: &Point<'_>) -> [
     });
     let effects = radiance.effects();
     [0, 1, 2].map(|c| effects.iter().map(|effect| f64::from(effect[c])).sum())
+}
+
+/// A part of a slab, and what is seen of it.
+struct Part {
+    extinction: f64,
+    color: [f32; 3],
+    /// Depth that it is lit at.
+    middle: f64,
+}
+
+/// Half of a part of a slab, values being linear in it.
+struct HalfPart {
+    /// ∫σ over its depths.
+    depth: f64,
+    color: [f64; 3],
+    /// Mean depth, weighed by extinction.
+    middle: f64,
+}
+
+impl HalfPart {
+    fn new(transfer: &TransferFunction, depths: [f64; 2], values: [f64; 2]) -> Self {
+        let length = depths[1] - depths[0];
+        let [extinction, red, green, blue, value] = mean_class(transfer, values[0], values[1]);
+        if extinction == 0.0 {
+            return Self { depth: 0.0, color: [0.0; 3], middle: depths[0] + 0.5 * length };
+        }
+        let rise = values[1] - values[0];
+        let share = if rise == 0.0 { 0.5 } else { (value / extinction - values[0]) / rise };
+        let color = [red, green, blue].map(|color| color / extinction);
+        Self { depth: extinction * length, color, middle: depths[0] + share * length }
+    }
+}
+
+/// Means of the extinction, and of the colours and the value times it, over all values between two: the transfer function is cut at its control points, and between these Simpson's rule
+/// is exact.
+fn mean_class(transfer: &TransferFunction, from: f64, to: f64) -> [f64; 5] {
+    let class = |value: f64| {
+        let points = transfer.points();
+        let upper = points.partition_point(|point| f64::from(point.value) <= value);
+        let [low, high] = [upper.saturating_sub(1), upper.min(points.len() - 1)].map(|i| points[i]);
+        let width = f64::from(high.value) - f64::from(low.value);
+        let part = if width > 0.0 { (value - f64::from(low.value)) / width } else { 0.0 };
+        let mix = |a: f32, b: f32| f64::from(a) + part * (f64::from(b) - f64::from(a));
+        let extinction = mix(low.extinction, high.extinction);
+        let [red, green, blue] = [0, 1, 2].map(|c| extinction * mix(low.color[c], high.color[c]));
+        [extinction, red, green, blue, extinction * value]
+    };
+    if from == to {
+        return class(from);
+    }
+    let [least, greatest] = [from.min(to), from.max(to)];
+    let inner = transfer.points().iter().map(|point| f64::from(point.value));
+    let cuts: Vec<f64> = std::iter::once(least)
+        .chain(inner.filter(|value| least < *value && *value < greatest))
+        .chain([greatest])
+        .collect();
+    let mut sums = [0.0; 5];
+    for pair in cuts.windows(2) {
+        let [low, middle, high] = [pair[0], 0.5 * (pair[0] + pair[1]), pair[1]].map(class);
+        (0..5).for_each(|n| sums[n] += (pair[1] - pair[0]) / 6.0 * (low[n] + 4.0 * middle[n] + high[n]));
+    }
+    sums.map(|sum| sum / (greatest - least))
 }
 
 /// −∇v/|∇v| of the field that gathered sheets read, at a world position.

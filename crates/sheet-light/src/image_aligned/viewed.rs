@@ -308,15 +308,15 @@ impl Viewed {
         })
     }
 
-    /// Lattice steps along each axis within which the places of neighbouring sheets lie, and with `gradient` those of neighbouring pixels.
-    pub(crate) fn steps_to_neighbours(&self, camera: &Camera, slabs: &Slabs, gradient: bool) -> [usize; 3] {
+    /// Lattice steps along each axis within which the places of sheets lie that are `apart` slabs away, and with `gradient` those of neighbouring pixels.
+    pub(crate) fn steps_to_neighbours(&self, camera: &Camera, slabs: &Slabs, apart: f64, gradient: bool) -> [usize; 3] {
         let far = slabs.width * f64::from(slabs.count);
         let pixel = if gradient { 1.0 / self.scale(far).unwrap_or(self.focal) } else { 0.0 };
         let inverse = self.axes.inverse();
         let rays = corner_rays(camera);
         [0, 1, 2].map(|a| {
             let row = inverse.row(a);
-            let steps = most_along(row, &rays) * slabs.width + row.x.abs().max(row.y.abs()) * pixel;
+            let steps = most_along(row, &rays) * apart * slabs.width + row.x.abs().max(row.y.abs()) * pixel;
             // What lies at a step by rounding does.
             ((steps - 1e-9).ceil()).clamp(0.0, 1e6) as usize
         })

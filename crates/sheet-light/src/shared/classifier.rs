@@ -14,10 +14,10 @@ const FEW: usize = 16;
 
 /// A control point with what follows it: extinction, red, green, blue are `at` + `slope`·(v − value).
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Piece {
-    value: f32,
-    start: [f32; 4],
-    slope: [f32; 4],
+pub(crate) struct Piece {
+    pub(crate) value: f32,
+    pub(crate) start: [f32; 4],
+    pub(crate) slope: [f32; 4],
 }
 
 /// A transfer function for values relative to a base.
@@ -49,6 +49,11 @@ impl Classifier {
             Piece { value: base.relative(points[i].value), start, slope: std::array::from_fn(slope) }
         };
         Self { first: four(0), pieces: (0..points.len()).map(piece).collect() }
+    }
+
+    /// The control points, values rising.
+    pub(crate) fn pieces(&self) -> &[Piece] {
+        &self.pieces
     }
 
     /// Extinction, red, green and blue.

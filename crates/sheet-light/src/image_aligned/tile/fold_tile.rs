@@ -158,8 +158,10 @@ impl VolumeScratch {
             Some(_) => self.crossings.slabs(&prepared.slabs),
             None => self.queue.active.clone(),
         };
-        // Nothing begins before.
-        self.batches.start = self.batches.start.max(self.active.start / BATCH);
+        // Nothing begins before, but sheets from which values change to the first one's.
+        let before = if prepared.preintegrated.is_some() { prepared.beside() } else { 0 };
+        let begin = self.active.start.saturating_sub(before);
+        self.batches.start = self.batches.start.max(begin / BATCH);
     }
 }
 
@@ -169,7 +171,7 @@ fn batches(prepared: &Prepared<'_>, span: &Range<u32>) -> Range<u32> {
     let first = span.start / prepared.stride;
     let last = span.end.saturating_sub(1) / prepared.stride;
     let begin = first.saturating_sub(prepared.sections.touched as u32 + 1);
-    let behind = if prepared.lacking.is_some() { 3 } else { 2 };
+    let behind = if prepared.lacking.is_some() { 3 } else { prepared.beside() + 1 };
     begin / BATCH..(last + behind).min(prepared.slabs.count).div_ceil(BATCH)
 }
 

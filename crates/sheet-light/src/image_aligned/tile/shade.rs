@@ -12,6 +12,7 @@ use crate::image_aligned::prepared::Prepared;
 use crate::shared::depths::{DepthRange, DepthSpans};
 use crate::shared::input::SheetInput;
 use crate::shared::pixel::Pixel;
+use crate::shared::preintegrated::{Preintegrated, Values};
 use crate::shared::sections::LEAST_WEIGHT;
 use crate::shared::vectors::dot;
 use crate::shared::volume::Volume;
@@ -57,6 +58,8 @@ pub(crate) struct Reconstructed<'a> {
 struct Medium<S: Simd> {
     near: Lanes<S>,
     far: Lanes<S>,
+    /// View depth of the place that it is lit at.
+    middle: Lanes<S>,
     /// Optical depth.
     depth: Lanes<S>,
     /// Length of each ray per unit of view depth.
@@ -64,15 +67,35 @@ struct Medium<S: Simd> {
     color: [Lanes<S>; 3],
 }
 
+/// The values of neighbouring rays beside the middle of a slab.
+struct Course<S: Simd> {
+    /// In the middle.
+    value: Lanes<S>,
+    /// How they grow from there towards the eye, per unit of view depth.
+    before: Lanes<S>,
+    /// How they grow away from it.
+    after: Lanes<S>,
+}
+
+impl<S: Simd> Course<S> {
+    /// The values at depths behind the middle.
+    #[inline(always)]
+    fn at(&self, simd: S, behind: Lanes<S>) -> Lanes<S> {
+        let zero = simd.lanes(0.0);
+        let grown = behind.max(zero).mul_add(self.after, self.value);
+        (zero - behind).max(zero).mul_add(self.before, grown)
+    }
+}
+
 /// What one volume brings to neighbouring pixels.
 struct Shaded<'a> {
     volume: &'a Volume<'a>,
     tau: [f32; MAX_LANES],
-    values: Values,
+    values: Channels,
 }
 
 /// A number for each channel of each pixel.
-type Values = [[f32; MAX_LANES]; MAX_CHANNELS];
+type Channels = [[f32; MAX_LANES]; MAX_CHANNELS];
 
 impl Shader<'_> {
     /// Adds a volume to the fragments; nothing where it has no optical depth in any of the pixels.
@@ -122,7 +145,7 @@ impl Shader<'_> {
         place: Place,
         medium: &Medium<S>,
         kept: &mut Kept,
-        values: &mut Values,
+        values: &mut Channels,
     ) {
         let material = reconstructed.prepared.volume.material;
         if material.shading == Shading::Unlit && self.layout.count() == 3 {
@@ -155,6 +178,9 @@ impl Shader<'_> {
         } else {
             self.ends(simd, reconstructed, place, faces)
         };
+        if let Some(preintegrated) = &reconstructed.prepared.preintegrated {
+            return self.integrate(simd, reconstructed, preintegrated, place, near, far);
+        }
         let length = (far - near).max(simd.lanes(0.0));
         let [value, weight] = if reconstructed.is_whole {
             reconstructed.sheets.load(simd, place.slab, place.y, place.x)
@@ -167,7 +193,75 @@ impl Shader<'_> {
         };
         let secant = self.secants(simd, place);
         let depth = (extinction * length * secant).where_less(simd.lanes(LEAST_WEIGHT), weight);
-        Medium { near, far, depth, secant, color: [red, green, blue] }
+        let middle = (near + far) * simd.lanes(0.5);
+        Medium { near, far, middle, depth, secant, color: [red, green, blue] }
+    }
+
+    /// The medium between two depths of each ray in its slab, of all values between these: the front half of the slab hides the back half.
+    #[inline(always)]
+    fn integrate<S: Simd>(
+        &self,
+        simd: S,
+        reconstructed: &Reconstructed<'_>,
+        preintegrated: &Preintegrated,
+        place: Place,
+        near: Lanes<S>,
+        far: Lanes<S>,
+    ) -> Medium<S> {
+        let Place { slab, y, x } = place;
+        let zero = simd.lanes(0.0);
+        let least = simd.lanes(LEAST_WEIGHT);
+        let slabs = &reconstructed.prepared.slabs;
+        let faces = slabs.faces(slab);
+        // Rays that are not inside have any depths, infinite ones too.
+        let near = near.min(simd.lanes(faces.far));
+        let far = far.max(near);
+        let center = simd.lanes(0.5 * (faces.near + faces.far));
+        let per_half = simd.lanes(2.0 / slabs.width as f32);
+        let sheets = reconstructed.sheets;
+        let own = sheets.load(simd, slab, y, x);
+        let before = sheets.load(simd, slab.max(1) - 1, y, x);
+        let after = sheets.load(simd, slab + 1, y, x);
+        let mut ends = [[zero; 2]; 2];
+        if !reconstructed.prepared.is_lacking(slab) {
+            ends = [sheets.load(simd, slab.max(2) - 2, y, x), sheets.load(simd, slab + 2, y, x)];
+        }
+        let [value, weight] = own;
+        let middle = center.max(near).min(far);
+        let course = Course {
+            value,
+            before: (at_face(simd, [ends[0], before, own, after]) - value) * per_half,
+            after: (at_face(simd, [ends[1], after, own, before]) - value) * per_half,
+        };
+        let values = Values {
+            near: course.at(simd, near - center),
+            middle: course.at(simd, middle - center),
+            far: course.at(simd, far - center),
+        };
+        let [first, second] = preintegrated.halves(simd, &values);
+        let secant = self.secants(simd, place);
+        let first_depth = first.extinction * (middle - near) * secant;
+        let second_depth = second.extinction * (far - middle) * secant;
+        let depth = (first_depth + second_depth).where_less(least, weight);
+        let extinction = reconstructed.prepared.volume.material.extinction_rgb;
+        let is_grey = extinction == [extinction[0]; 3];
+        let mut color = first.color;
+        let mut shares = [zero; 3];
+        for c in 0..3 {
+            shares[c] = if c > 0 && is_grey {
+                shares[0]
+            } else {
+                let factor = simd.lanes(extinction[c]);
+                let opacity = (first_depth * factor).opacity();
+                let behind = (simd.lanes(1.0) - opacity) * (second_depth * factor).opacity();
+                behind / (opacity + behind).max(simd.lanes(f32::MIN_POSITIVE))
+            };
+            color[c] = (second.color[c] - first.color[c]).mul_add(shares[c], first.color[c]);
+        }
+        let first_place = (middle - near).mul_add(first.place, near);
+        let second_place = (far - middle).mul_add(second.place, middle);
+        let middle = (second_place - first_place).mul_add(shares[1], first_place);
+        Medium { near, far, middle, depth, secant, color }
     }
 
     /// The depths between two others within which each ray is inside of the volume and of the limits.
@@ -249,8 +343,6 @@ impl Shader<'_> {
         lane_bits: u32,
     ) -> Spots<S> {
         let zero = simd.lanes(0.0);
-        let half = simd.lanes(0.5);
-        let middle = (medium.near + medium.far) * half;
         let towards = simd.lanes(-1.0) / medium.secant;
         let to_eye = if self.input.camera.is_orthographic() {
             [zero, zero, towards]
@@ -258,7 +350,7 @@ impl Shader<'_> {
             let [u, v] = self.slopes(simd, place);
             [u * towards, v * towards, towards]
         };
-        let places = self.slopes.places(simd, Pixel { x: place.x, y: place.y }, middle);
+        let places = self.slopes.places(simd, Pixel { x: place.x, y: place.y }, medium.middle);
         let prepared = reconstructed.prepared;
         let (normal, is_normal) = if let Some(gradients) = &prepared.gradients {
             unit(simd, &gradients.gradients(simd, &prepared.voxels, &places, lane_bits))
@@ -337,7 +429,7 @@ impl Shader<'_> {
         reconstructed: &Reconstructed<'_>,
         place: Place,
         medium: &Medium<S>,
-        values: &mut Values,
+        values: &mut Channels,
     ) {
         let mut tau = [0.0; MAX_LANES];
         medium.depth.store(&mut tau);
@@ -372,7 +464,7 @@ impl Shader<'_> {
         spots: &Spots<S>,
         medium: &Medium<S>,
         lane_bits: u32,
-        values: &mut Values,
+        values: &mut Channels,
     ) {
         let volume = &reconstructed.prepared.volume;
         let radius = reconstructed.prepared.viewed.reach as f32 / 3.0;
@@ -391,7 +483,9 @@ impl Shader<'_> {
                 let cells = neighbours.cells(simd, voxels, &spots.places, lane_bits);
                 let mut thick_parts = None;
                 if let Some(within) = &reconstructed.prepared.within {
-                    let length = (medium.far - medium.near) * medium.secant;
+                    // What lies to one side of the middle of its part begins there.
+                    let reach = (medium.middle - medium.near).min(medium.far - medium.middle);
+                    let length = (reach + reach) * medium.secant;
                     let Spots { places, to_eye, .. } = spots;
                     thick_parts = Some(within.parts(simd, neighbours, places, to_eye, length, medium.depth));
                 }
@@ -427,6 +521,19 @@ impl Shader<'_> {
             lit.shadow(simd).store(&mut values[at]);
         }
     }
+}
+
+/// Values at the face between the second and the third of four sheets, each with its kernels' sum: by a cubic through all four, and no further than between the two beside it, so that
+/// what is hidden stays hidden. Sheets that are not read show nothing, and nor do the values on the way there.
+#[inline(always)]
+fn at_face<S: Simd>(simd: S, sheets: [[Lanes<S>; 2]; 4]) -> Lanes<S> {
+    let [[first, first_weight], [second, second_weight], [third, _], [fourth, fourth_weight]] = sheets;
+    let least = simd.lanes(LEAST_WEIGHT);
+    let both = second + third;
+    let bend = ((both - first) - fourth) * simd.lanes(1.0 / 16.0);
+    let bend = bend.where_less(least, first_weight).where_less(least, fourth_weight);
+    let face = both.mul_add(simd.lanes(0.5), bend);
+    face.max(second.min(third)).min(second.max(third)).where_less_or(least, second_weight, third)
 }
 
 /// −∇v/|∇v|, and 1 where there is a gradient, else 0.

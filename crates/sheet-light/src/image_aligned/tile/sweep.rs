@@ -34,11 +34,11 @@ impl VolumeScratch {
         self.active.contains(&slab_of_volume).then_some(slab_of_volume)
     }
 
-    /// Whether the sheet there, or the next one, which tells how values go on, is not finished. Beside the eye the next one needs another.
+    /// Whether the sheet there, or the next one, which tells how values go on, is not finished. Beside the eye the next one needs another; a course of values needs two.
     #[inline(always)]
     fn needs(&self, prepared: &Prepared<'_>, slab: u32) -> bool {
-        let more =
-            if prepared.lacking.as_ref().is_some_and(|lacking| slab / prepared.stride < lacking.end) { 2 } else { 1 };
+        let is_near = prepared.lacking.as_ref().is_some_and(|lacking| slab / prepared.stride < lacking.end);
+        let more = if is_near { 2 } else { prepared.beside() };
         let is_behind = |slab| !self.batches.is_empty() && self.batches.start * BATCH <= slab + more;
         self.own_slab(prepared, slab).is_some_and(is_behind)
     }
@@ -57,7 +57,13 @@ impl VolumeScratch {
         self.batches.start += 1;
         let mask = picture.mask(prepared.compares);
         if let Some(gathered) = &prepared.gathered {
-            let lines = SheetLines { rays: &prepared.rays, slopes, slabs: &prepared.slabs, crossings: &self.crossings };
+            let lines = SheetLines {
+                rays: &prepared.rays,
+                slopes,
+                slabs: &prepared.slabs,
+                crossings: &self.crossings,
+                beside: prepared.beside(),
+            };
             counts.fragments += lines.batch(simd, gathered, batch, &mask, &mut self.sheets);
             return;
         }
