@@ -107,6 +107,8 @@ fn explain_says_which_form_draws_and_why() {
         (&["render.sheets.kernel_extent=3"], "splatted slabs", "a kernel that is splatted alone"),
         (&["render.sheets.kernel_sections=64"], "splatted slabs", "a kernel that is splatted alone"),
         (&["render.sheets.classify='before'"], "splatted slabs", "before they are reconstructed"),
+        (&["render.sheets.classify='preintegrated'"], "gathered slabs", "so that nothing thinner is missed"),
+        (&["render.sheets.classify='after'"], "gathered slabs", "the value in the middle of a slab has the class"),
         (&["render.sheets.aligned='axis'", "camera.orthographic=2"], "splatted slabs", "along the lattice"),
         (&["render.sheets.accumulation='f16'"], "splatted slabs", "half precision"),
         (&["render.sheets.slicing='half_vector'"], "gathered slabs", "half vectors"),
@@ -143,6 +145,8 @@ fn what_gathered_slabs_have_not_is_refused_by_name() {
         ("kernel = 'linear', reconstruction = 'splat'", "`kernel`"),
         ("gradients = 'kernel', kernel_extent = 3", "`kernel_extent`"),
         ("gradients = 'kernel', reconstruction = 'splat'", "`gradients`"),
+        ("classify = 'preintegrated', slicing = 'half_vector'", "`classify`"),
+        ("classify = 'during'", "during"),
         ("kernel = 'cubic'", "cubic"),
         ("reconstruction = 'both'", "both"),
     ] {
@@ -322,6 +326,7 @@ fn what_the_older_methods_and_body_centred_lattices_do_not_draw_is_refused_by_na
     refused(&[bcc, "render.technique='points'"], 2, "the technique `points` draws no body-centred lattice");
     refused(&["object.fog.lattice='bcc'"], 2, "`lattice` belongs to a `volume`");
     refused(&["render.sheets.classify='before'", half], 2, "slabs across half vectors have no such choice");
+    refused(&["render.sheets.classify='preintegrated'", half], 2, "slabs across half vectors have no such choice");
     refused(&[axis, half], 2, "slabs across half vectors have no such choice");
     refused(&[axis, "render.sheets.slab_width=0.1"], 2, "as wide as its planes are apart");
     refused(&[axis, "camera={position=[0, 0, 4], target=[0, 0, 0], size=[16, 16]}"], 2, "parallel rays alone");

@@ -467,6 +467,7 @@ fn render() -> Vec<Entry> {
         of(BALL, "render.sheets", "render.sheets={slab_width=0.4}").by(SHEETS),
         of(BALL, "render.sheets.slicing", "render.sheets.slicing='half_vector'").by(SHEETS),
         of(VOLUME, "render.sheets.classify", "render.sheets.classify='before'").by(SHEETS),
+        of(VOLUME, "render.sheets.classify", "render.sheets.classify='preintegrated'").by(SHEETS),
         of(VOLUME, "render.sheets.aligned", "render.sheets.aligned='axis'").by(SHEETS).with(&["camera.orthographic=2"]),
         of(BALL, "render.sheets.light_pixels", "render.sheets.light_pixels=0.4").by(SHEETS).with(HALF_VECTOR),
         of(BALL, "render.sheets.most_light_pixels", "render.sheets.most_light_pixels=16").by(SHEETS).with(HALF_VECTOR),

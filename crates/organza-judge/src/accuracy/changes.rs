@@ -202,7 +202,13 @@ fn sheets(render: &RenderSettings, settings: &mut Vec<Stated>) {
     add("gradients", quoted(gradients));
     add("transmittance_cutoff", number(sheets.transmittance_cutoff));
     let Slicing::HalfVector { light_pixels, scattering, soft_shadows, .. } = sheets.slicing else {
-        add("classify", quoted(if sheets.classify == Classify::Before { "before" } else { "after" }));
+        let classify = match sheets.classify {
+            Classify::Auto => "auto",
+            Classify::After => "after",
+            Classify::Preintegrated => "preintegrated",
+            Classify::Before => "before",
+        };
+        add("classify", quoted(classify));
         return;
     };
     add("light_pixels", number(light_pixels));

@@ -224,7 +224,9 @@ fn check_sheets(at: &At<'_>, raw: &RawSheets) -> Result<SheetsSettings, Error> {
         may_slice: raw.slicing == RawSlicing::Auto,
         may_scatter: raw.scattering == RawScattering::Auto,
         classify: match raw.classify {
-            None | Some(RawClassify::After) => Classify::After,
+            None | Some(RawClassify::Auto) => Classify::Auto,
+            Some(RawClassify::After) => Classify::After,
+            Some(RawClassify::Preintegrated) => Classify::Preintegrated,
             Some(RawClassify::Before) => Classify::Before,
         },
         aligned: check_aligned(at, raw, slab_width)?,

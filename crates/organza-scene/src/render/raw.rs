@@ -79,7 +79,8 @@ pub(crate) struct RawParticles {
 pub(crate) struct RawSheets {
     /// What slabs lie across, "view", "half_vector", the bisector of light and view, or "auto" (default).
     pub(crate) slicing: RawSlicing,
-    /// With "view": when values become colours, "after" (default) they are reconstructed, or "before" they are splatted.
+    /// With "view": when values become colours: "after" they are reconstructed, the value in the middle of a slab alone; "preintegrated", all values that a ray
+    /// meets in a slab; "before" they are splatted; or "auto" (default).
     pub(crate) classify: Option<RawClassify>,
     /// With "view": what slabs lie along, "view" (default), or "axis", the lattice of the only volume, seen by parallel rays.
     pub(crate) aligned: Option<RawAligned>,
@@ -164,7 +165,9 @@ pub(crate) enum RawSlicing {
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Classify")]
 pub(crate) enum RawClassify {
+    Auto,
     After,
+    Preintegrated,
     Before,
 }
 

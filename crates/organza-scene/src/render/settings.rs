@@ -175,7 +175,7 @@ pub struct SheetsSettings {
     pub may_slice: bool,
     /// Whether the scene leaves to the plan how often media scatter light; until the plan decides, they scatter it once.
     pub may_scatter: bool,
-    /// When values become colours; after they are reconstructed in half-vector slicing.
+    /// When values become colours; left to the plan in half-vector slicing, which classifies after reconstruction.
     pub classify: Classify,
     /// What slabs lie along; the view in half-vector slicing. Slabs along a lattice take parallel rays and no width.
     pub aligned: Aligned,
@@ -205,7 +205,7 @@ impl SheetsSettings {
     pub fn carrying_light(&self) -> Option<Self> {
         let mut settings = *self;
         // Half vectors know neither of the other choices.
-        let is_free = self.classify == Classify::After && self.aligned == Aligned::View;
+        let is_free = matches!(self.classify, Classify::Auto | Classify::After) && self.aligned == Aligned::View;
         if self.may_slice && is_free {
             settings.slicing = Slicing::HALF_VECTOR;
         }
@@ -404,8 +404,12 @@ pub enum Bending {
 /// When values become colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Classify {
-    /// When they are reconstructed.
+    /// As the plan chooses.
+    Auto,
+    /// When they are reconstructed, the value in the middle of a slab.
     After,
+    /// When they are reconstructed, all values that a ray meets in a slab.
+    Preintegrated,
     /// At the voxels, before they are splatted.
     Before,
 }

@@ -462,6 +462,7 @@ mod tests {
             "slicing = 'view'",
             "scattering = 'once'",
             "classify = 'before'",
+            "classify = 'preintegrated'",
             "slicing = 'half_vector', scattering = 'once'",
         ] {
             assert_eq!(

@@ -321,7 +321,7 @@ pub(crate) fn plans(scene: &Scene, loaded: &Loaded, plan: &mut Plan) {
     ));
 }
 
-/// Where normals of volumes come from, the precision of the sums of slabs, what slabs lie across, and how often they scatter light: every planned picture of this technique has these.
+/// Where normals of volumes come from, when their values become colours, the precision of the sums of slabs, what slabs lie across, and how often they scatter light: every planned picture of this technique has these.
 pub(crate) fn settings(scene: &Scene, loaded: &Loaded, _: &Plan) -> Vec<PlannedSetting> {
     let sheets = &scene.render.sheets;
     let precision = points::precision(sheets.accumulation);
@@ -337,7 +337,8 @@ pub(crate) fn settings(scene: &Scene, loaded: &Loaded, _: &Plan) -> Vec<PlannedS
     let scene::Slicing::HalfVector { scattering: again, .. } = sheets.slicing else {
         let reason =
             "slabs lie across the view unless a scene, or a technique that is `auto`, asks for light that they carry";
-        return normals.into_iter().chain([accumulation, slicing("view", reason)]).collect();
+        let classified = classified(scene, loaded);
+        return normals.into_iter().chain(classified).chain([accumulation, slicing("view", reason)]).collect();
     };
     let often = match again {
         None if scene.render.choice.is_some() => scattering(
@@ -352,6 +353,34 @@ pub(crate) fn settings(scene: &Scene, loaded: &Loaded, _: &Plan) -> Vec<PlannedS
     };
     let slicing = slicing("half_vector", "slabs across half vectors carry light through media themselves");
     normals.into_iter().chain([accumulation, slicing, often]).collect()
+}
+
+/// When the values of volumes become colours.
+fn classification(scene: &Scene) -> Classify {
+    let sheets = &scene.render.sheets;
+    match sheets.classify {
+        scene::Classify::After => Classify::After,
+        scene::Classify::Preintegrated => Classify::Preintegrated,
+        scene::Classify::Before => Classify::Before,
+        scene::Classify::Auto => Classify::After,
+    }
+}
+
+/// When values become colours in slabs across the view, where a volume lies in these.
+fn classified(scene: &Scene, loaded: &Loaded) -> Option<PlannedSetting> {
+    let is_volume = |native: &Own| native.technique == Technique::Sheets && native.grid().is_some();
+    if !loaded.own.iter().any(is_volume) {
+        return None;
+    }
+    let (name, reason) = match classification(scene) {
+        Classify::After => ("after", "the value in the middle of a slab has the class of the slab"),
+        Classify::Preintegrated => {
+            ("preintegrated", "all values that a ray meets in a slab are classified, so that nothing thinner is missed")
+        }
+        Classify::Before => ("before", "colours and extinctions of voxels are splatted"),
+    };
+    let is_stated = scene.render.sheets.classify != scene::Classify::Auto;
+    Some(PlannedSetting::new("render.sheets.classify", format!("\"{name}\""), is_stated, reason))
 }
 
 /// Where normals come from, where a volume reflects about its gradient.
@@ -513,7 +542,7 @@ fn params(scene: &Scene, reconstruction: Reconstruction, exponent: i32, options:
     let unit = libm::exp2(f64::from(-exponent));
     Params {
         slab_width: settings.slab_width.map(|width| width * unit),
-        classify: if settings.classify == scene::Classify::Before { Classify::Before } else { Classify::After },
+        classify: classification(scene),
         aligned: if settings.aligned == scene::Aligned::Axis { Aligned::Axis } else { Aligned::View },
         reconstruction,
         kernel: KernelShape { extent: settings.kernel_extent, sigma: settings.kernel_sigma },

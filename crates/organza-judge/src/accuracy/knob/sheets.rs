@@ -210,18 +210,26 @@ fn reconstruction(scene: &Scene, has_slabs: bool) -> Result<Knob, String> {
 
 /// When values become colours.
 fn classification(scene: &Scene) -> Result<Knob, String> {
-    if scene.render.sheets.reconstruction == Reconstruction::Gather {
-        return Err(GATHERED.into());
-    }
     if scene.render.sheets.slicing != Slicing::View {
         return Err("slabs across half vectors classify what they have reconstructed".into());
     }
+    const AFTER: (&str, f64) = ("the middle of a slab after reconstruction", 0.0);
+    const PREINTEGRATED: (&str, f64) = ("all of a slab after reconstruction", 1.0);
+    const BEFORE: (&str, f64) = ("voxels before reconstruction", 2.0);
+    let is_gathered = scene.render.sheets.reconstruction == Reconstruction::Gather;
+    let steps: &[(&str, f64)] = if is_gathered { &[AFTER, PREINTEGRATED] } else { &[AFTER, PREINTEGRATED, BEFORE] };
     Ok(choices(
         "classification",
         |request, value| {
-            request.scene.render.sheets.classify = if value > 0.0 { Classify::Before } else { Classify::After };
+            request.scene.render.sheets.classify = if value == AFTER.1 {
+                Classify::After
+            } else if value == PREINTEGRATED.1 {
+                Classify::Preintegrated
+            } else {
+                Classify::Before
+            };
         },
-        &[("after reconstruction", 0.0), ("before it", 1.0)],
+        steps,
     ))
 }
 
