@@ -20,6 +20,9 @@ fn smooth(p: DVec3) -> f64 {
     (1.3 * p.x).sin() + (0.9 * p.y + p.z).cos() + 0.2 * p.z
 }
 
+/// The steepest that extinction rises in [`many_points`], per unit of value: by at most ten steps of .08 between two of 64 points.
+const STEEPEST: f64 = 0.08 * 10.0 * 63.0;
+
 /// A transfer function of so many points that they are looked up, not tried one by one.
 fn many_points() -> TransferFunction {
     let point = |k: u16| {
@@ -35,14 +38,16 @@ fn preintegrated_sheets_are_those_of_the_twin() {
     let few = transfer(&[(0.2, 0.0), (0.45, 0.4), (0.55, 1.0), (0.65, 0.4), (0.8, 0.1), (0.9, 1.5)]);
     let material = unlit();
     let sheared = DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.2, 0.6, -0.1), DVec3::new(-0.1, 0.1, -0.7));
-    for (tf, axes) in [(&few, cubic(0.5)), (&few, sheared), (&many_points(), sheared)] {
+    // A value is rounded to 24 bits, and extinction with it, on a way of 10 units through the volume.
+    let rounded = STEEPEST * f64::from(f32::EPSILON) * 10.0;
+    for (tf, axes, most) in [(&few, cubic(0.5), 2e-5), (&few, sheared, 2e-5), (&many_points(), sheared, rounded)] {
         let grid = grid([17, 13, 11], axes, noise);
         let volumes = [volume(&grid, tf, &material)];
         for camera in [parallel([3.0, 2.0, 8.0], 11.0, [70, 50]), perspective([2.0, 3.0, 6.0], 60.0, [50, 70])] {
             for slab_width in [None, Some(0.11), Some(1.7)] {
                 let params = preintegrated(Params { slab_width, ..exact() });
                 let [tau, color] = differences(&input(&volumes, &camera, &[]), &params);
-                assert!(tau < 2e-5 && color < 1e-5, "{slab_width:?}: {tau:e} {color:e}");
+                assert!(tau < most && color < 1e-5, "{slab_width:?}: {tau:e} {color:e}");
             }
         }
     }
