@@ -102,13 +102,18 @@ fn explain_says_which_form_draws_and_why() {
     };
     for (settings, form, reason) in [
         (&[][..], "gathered slabs", "a twentieth of the voxels or more has extinction"),
+        (&[][..], "gathered slabs", "the value in the middle of a slab has the class"),
         (&["render.sheets.kernel='linear'"], "linearly gathered slabs", "the scene asks for it"),
         (&["render.sheets.reconstruction='splat'"], "splatted slabs", "the scene asks for it"),
         (&["render.sheets.kernel_extent=3"], "splatted slabs", "a kernel that is splatted alone"),
         (&["render.sheets.kernel_sections=64"], "splatted slabs", "a kernel that is splatted alone"),
         (&["render.sheets.classify='before'"], "splatted slabs", "before they are reconstructed"),
-        (&["render.sheets.classify='preintegrated'"], "gathered slabs", "so that nothing thinner is missed"),
-        (&["render.sheets.classify='after'"], "gathered slabs", "the value in the middle of a slab has the class"),
+        (
+            &["render.sheets.classify='preintegrated'"],
+            "gathered slabs",
+            "render.sheets.classify \"preintegrated\" scene",
+        ),
+        (&["render.sheets.classify='after'"], "gathered slabs", "render.sheets.classify \"after\" scene"),
         (&["render.sheets.aligned='axis'", "camera.orthographic=2"], "splatted slabs", "along the lattice"),
         (&["render.sheets.accumulation='f16'"], "splatted slabs", "half precision"),
         (&["render.sheets.slicing='half_vector'"], "gathered slabs", "half vectors"),
