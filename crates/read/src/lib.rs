@@ -137,6 +137,8 @@ pub struct ReadParams {
     pub array: Option<String>,
     /// The size of a voxel of a volume, in the place of the file's.
     pub voxel_size: Option<VoxelSize>,
+    /// Whether cells of VTK that enclose a volume are read as the faces around them, a mesh with columns, and not as a volume.
+    pub surfaces: bool,
     /// Whether points may become a medium: columns `smoothing_length`, `extinction` and `mass` are kept too, beside those that are kept of all
     /// points where there are such, `radius`, `tx`, `ty`, `tz`, `shadow_coefficient`, `footprint` and `material`. Numbers that these cannot have are refused, see
     /// `convert::raw_to_matter` and `convert::raw_to_surfels`.
@@ -165,6 +167,7 @@ impl Default for ReadParams {
             columns: Vec::new(),
             array: None,
             voxel_size: None,
+            surfaces: false,
             matter: false,
             ranges: false,
             is_data: false,

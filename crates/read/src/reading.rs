@@ -132,6 +132,9 @@ pub struct Notes {
     pub mended: Vec<Mended>,
     /// The value of a volume outside of the cells that it was sampled from; `None` where its voxels are those of the file.
     pub value_outside: Option<f64>,
+    /// The column of a mesh that a VTK file shows: that of its active attribute, or the first field of cells that enclose a volume. `None` where the
+    /// mesh has colours, and of other files.
+    pub shown_column: Option<String>,
 }
 
 impl Notes {

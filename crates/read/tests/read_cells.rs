@@ -325,3 +325,93 @@ fn what_is_wrong_in_cells_of_xml_is_named() {
         refused("a.vtu", &text.replacen(from, to, 1), expected);
     }
 }
+
+/// Two hexahedra side by side with these arrays behind them.
+fn two_hexahedra(arrays: &str) -> String {
+    format!(
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 12 float\n\
+         0 0 0 1 0 0 2 0 0 0 1 0 1 1 0 2 1 0\n0 0 1 1 0 1 2 0 1 0 1 1 1 1 1 2 1 1\n\
+         CELLS 2 18\n8 0 1 4 3 6 7 10 9\n8 1 2 5 4 7 8 11 10\nCELL_TYPES 2\n12 12\n{arrays}"
+    )
+}
+
+/// The surface around the cells, with the column that the file shows.
+fn surface(name: &str, content: &[u8]) -> (Mesh, Notes) {
+    let with = |columns: Vec<String>| {
+        let params = ReadParams { surfaces: true, columns, ..ReadParams::default() };
+        match bytes(name, content, &params, None).unwrap_or_else(|e| panic!("{e}")) {
+            (Loaded::Mesh(mesh), notes) => (mesh, notes),
+            other => panic!("not a mesh: {other:?}"),
+        }
+    };
+    with(with(Vec::new()).1.shown_column.into_iter().collect())
+}
+
+#[test]
+fn the_surface_of_cells_is_their_outer_faces_with_the_numbers_that_they_have() {
+    let of_cells = two_hexahedra("CELL_DATA 2\nSCALARS attribute float 1\nLOOKUP_TABLE default\n1 2\n");
+    let (mesh, notes) = surface("a.vtk", of_cells.as_bytes());
+    assert_eq!((mesh.triangles.len(), mesh.position.len()), (2 * 10, 12));
+    assert_eq!(notes.shown_column.as_deref(), Some("attribute"));
+    // No mean of two cells anywhere.
+    let values = &mesh.columns[0].values;
+    assert_eq!(values.iter().filter(|value| **value == 1.0).count(), 10);
+    assert_eq!(values.iter().filter(|value| **value == 2.0).count(), 10);
+    let said = "2 cells drawn as the 10 faces around them; `volume` in the place of `mesh` draws what is inside";
+    assert_eq!(notes.remarks, [said]);
+    // Cells that are inside out are no fault.
+    let inside_out = of_cells
+        .replace("8 0 1 4 3 6 7 10 9", "8 6 7 10 9 0 1 4 3")
+        .replace("8 1 2 5 4 7 8 11 10", "8 7 8 11 10 1 2 5 4");
+    let (turned, notes) = surface("a.vtk", inside_out.as_bytes());
+    let volume = |mesh: &Mesh| {
+        let corner = |v: u32| mesh.position[v as usize];
+        mesh.triangles.iter().map(|[a, b, c]| corner(*a).dot(corner(*b).cross(corner(*c))) / 6.0).sum::<f32>()
+    };
+    assert!((volume(&turned) - 2.0).abs() < 1e-5 && notes.mended.is_empty(), "{:?}", notes.mended);
+    let of_points = two_hexahedra("POINT_DATA 12\nSCALARS x float 1\nLOOKUP_TABLE default\n0 1 2 0 1 2 0 1 2 0 1 2\n");
+    let (mesh, _) = surface("a.vtk", of_points.as_bytes());
+    let places = mesh.position.iter().map(|p| mesh.origin.x + f64::from(p.x));
+    assert!(places.zip(&mesh.columns[0].values).all(|(x, value)| x == *value));
+    // Every way to write cells gives the same surface; what is inside a cell of more points is no vertex.
+    let (expected, _) = surface("a.vtu", &vtu("ascii", false));
+    for content in [vtu("binary", true), vtu_pieces("ascii", false)] {
+        let (found, _) = surface("a.vtu", &content);
+        assert_eq!((found.triangles.len(), found.bounds()), (expected.triangles.len(), expected.bounds()));
+    }
+}
+
+#[test]
+fn numbers_that_tell_points_apart_are_shown_last_and_active_attributes_first() {
+    let field = |name: &str, numbers: &str| format!("{name} {numbers} 2 float\n{}\n", "1 2 ".repeat(3).trim());
+    let of = |arrays: &[(&str, &str)], attributes: &str| {
+        let fields: String = arrays.iter().map(|(name, numbers)| field(name, numbers)).collect();
+        let fields = fields.replace("1 2 1 2 1 2", "1 2");
+        let head = if arrays.is_empty() { String::new() } else { format!("FIELD f {}\n{fields}", arrays.len()) };
+        surface("a.vtk", two_hexahedra(&format!("CELL_DATA 2\n{attributes}{head}")).as_bytes()).1.shown_column
+    };
+    let one = "1";
+    assert_eq!(of(&[("vtkOriginalCellIds", one), ("DENSITY", one)], "").as_deref(), Some("DENSITY"));
+    assert_eq!(of(&[("GLOBAL_IDS_CELLS", one), ("ObjectId", one), ("PORO", one)], "").as_deref(), Some("PORO"));
+    assert_eq!(of(&[("cell_ids", one)], "").as_deref(), Some("cell_ids"));
+    let scalars = "SCALARS heat float 1\nLOOKUP_TABLE default\n1 2\n";
+    assert_eq!(of(&[("PORO", one)], scalars).as_deref(), Some("heat"));
+    let ids = "SCALARS vtkOriginalCellIds float 1\nLOOKUP_TABLE default\n1 2\n";
+    assert_eq!(of(&[("PORO", one)], ids).as_deref(), Some("PORO"));
+    // In XML the active vectors count before arrays that nothing names.
+    let xml = |attributes: &str| {
+        let text = String::from_utf8(vtu("ascii", false)).unwrap();
+        let (before, rest) = text.split_once("<CellData").unwrap();
+        let (_, after) = rest.split_once("</CellData>").unwrap();
+        let arrays = "<DataArray type=\"Float32\" Name=\"p\" format=\"ascii\">1 2 3</DataArray>\
+                      <DataArray type=\"Float32\" Name=\"U\" NumberOfComponents=\"3\" format=\"ascii\">1 0 0 2 0 0 3 0 0</DataArray>";
+        let without_points = before.split_once("<PointData").map_or(before, |(before, _)| before);
+        let text = format!("{without_points}<CellData {attributes}>{arrays}</CellData>{after}");
+        surface("a.vtu", text.as_bytes()).1.shown_column
+    };
+    assert_eq!(xml("").as_deref(), Some("p"));
+    assert_eq!(xml("Vectors=\"U\"").as_deref(), Some("U:magnitude"));
+    // A surface shows what its file calls active, and nothing else unasked.
+    let (_, notes) = mesh("a.vtp", &vtp());
+    assert_eq!(notes.shown_column, None);
+}

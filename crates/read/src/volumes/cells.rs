@@ -2,6 +2,7 @@
 
 mod kind;
 mod lists;
+mod outer;
 mod parting;
 mod polyhedron;
 mod resample;
@@ -13,6 +14,7 @@ use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::meshes::fans::Fans;
 use crate::meshes::opacity;
+use crate::meshes::outwards::turn_outwards;
 use crate::meshes::tubes::Tubes;
 use crate::points::direction::unit;
 use crate::points::origin;
@@ -256,6 +258,9 @@ impl Cells {
         reading: &mut Reading<'_>,
     ) -> Result<Loaded, ReadError> {
         self.remark_kinds(reading);
+        if self.has_bodies() && reading.params.surfaces {
+            return self.surface(columns, reading).map(Loaded::Mesh);
+        }
         if self.has_bodies() {
             let hidden = self.kinds.iter().filter(|kind| **kind == HIDDEN).count();
             let flat = self.kinds.len() - hidden - self.bodies().count();
@@ -307,6 +312,55 @@ impl Cells {
         fans.into_mesh(vertices, reading).map(Loaded::Mesh)
     }
 
+    /// The faces around the bodies, and cells that are faces by themselves, with the points that they have.
+    fn surface(self, columns: PointColumns, reading: &mut Reading<'_>) -> Result<Mesh, ReadError> {
+        let faces = outer::faces(&self, reading)?;
+        let bodies = counted(self.bodies().count() as u64, "cell");
+        let outer = counted(faces.len() as u64, "face");
+        reading.notes.remark(format!(
+            "{bodies} drawn as the {outer} around them; `volume` in the place of `mesh` draws what is inside"
+        ));
+        let PointColumns { color, opacity, mut named, .. } = columns;
+        let mut fans = Fans::default();
+        let mut cell_of = Vec::new();
+        // Points within the bodies are no vertices.
+        const NOT_USED: u32 = u32::MAX;
+        let mut vertex_of = vec![NOT_USED; self.points.len()];
+        let mut points_used: Vec<u32> = Vec::new();
+        for (cell, corners) in faces.iter() {
+            let mut vertices = Vec::with_capacity(corners.len());
+            for corner in corners {
+                let vertex = &mut vertex_of[*corner as usize];
+                if *vertex == NOT_USED {
+                    *vertex = points_used.len() as u32;
+                    points_used.push(*corner);
+                }
+                vertices.push(*vertex);
+            }
+            fans.add(u64::from(cell), &vertices, self.place, reading)?;
+            cell_of.resize(fans.len(), cell);
+        }
+        input::hold("the vertices", points_used.len() as u64 * BYTES_PER_VERTEX, reading.params)?;
+        let of_vertices = |values: &[f64]| points_used.iter().map(|point| values[*point as usize]).collect();
+        for column in &mut named {
+            column.values = match column.association {
+                Association::Vertex => of_vertices(&column.values),
+                Association::Triangle => cell_of.iter().map(|cell| column.values[*cell as usize]).collect(),
+            };
+        }
+        let places: Vec<DVec3> = points_used.iter().map(|point| self.points[*point as usize]).collect();
+        let (origin, position) = origin::relative(&places, self.place, |i| format!("point {}", points_used[i]))?;
+        let used = |point: &u32| *point as usize;
+        let color = points_used.iter().filter_map(|point| color.get(used(point)).copied()).collect();
+        let opacity = points_used.iter().filter_map(|point| opacity.get(used(point)).copied()).collect();
+        let mut vertices = Mesh { origin, position, color, columns: named, ..Mesh::default() };
+        opacity::give(&mut vertices, opacity, &mut reading.notes);
+        let mut mesh = fans.into_mesh(vertices, reading)?;
+        // Cells may be inside out: that is no fault of a surface.
+        turn_outwards(&mut mesh);
+        Ok(mesh)
+    }
+
     /// The cells that enclose a volume, each with its rank among all cells.
     fn bodies(&self) -> impl Iterator<Item = Body<'_>> {
         self.kinds.iter().zip(self.lists.iter()).enumerate().filter_map(|(cell, (number, corners))| {
@@ -341,33 +395,12 @@ impl Cells {
         let mut faces = 0;
         let mut lines = 0;
         for (i, (number, corners)) in self.kinds.iter().zip(self.lists.iter()).enumerate() {
-            let mut add = |corners: &[u32], reading: &mut Reading<'_>| fans.add(i as u64, corners, self.place, reading);
-            let kind = Kind::of_cell(*number, corners.len());
-            match kind.map(|kind| kind.shape) {
-                Some(Shape::Face) => add(kind.map_or(corners, |kind| kind.drawn(corners)), reading)?,
-                Some(Shape::Faces(parts)) => {
-                    for part in parts {
-                        let corners: Vec<u32> = part.iter().map(|rank| corners[usize::from(*rank)]).collect();
-                        add(&corners, reading)?;
-                    }
-                }
-                Some(Shape::CurvedFace) => {
-                    let half = corners.len() / 2;
-                    let around = corners[..half].iter().zip(&corners[half..]).flat_map(|(a, b)| [*a, *b]);
-                    add(&around.collect::<Vec<_>>(), reading)?;
-                }
-                // Its second row runs the other way.
-                Some(Shape::Pixel) => add(&[corners[0], corners[1], corners[3], corners[2]], reading)?,
-                Some(Shape::Strip) => {
-                    for (k, t) in corners.windows(3).enumerate() {
-                        add(&if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] }, reading)?;
-                    }
-                }
-                Some(Shape::Line) => {
-                    lines += 1;
-                    continue;
-                }
-                _ => continue,
+            let Some(kind) = Kind::of_cell(*number, corners.len()) else { continue };
+            if matches!(kind.shape, Shape::Line) {
+                lines += 1;
+            }
+            if !kind.each_face(corners, |face| fans.add(i as u64, face, self.place, reading))? {
+                continue;
             }
             faces += 1;
             if has_columns {

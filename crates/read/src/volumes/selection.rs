@@ -58,7 +58,7 @@ pub(crate) struct Candidate {
     /// Numbers of a tuple, and their type.
     pub(crate) numbers: u64,
     pub(crate) kind: Option<Kind>,
-    /// Whether the file says that it is the one to show.
+    /// Whether the file says that it is the one to show: the active scalars, or the active vectors.
     pub(crate) is_named: bool,
     /// Whether it belongs to the cells.
     pub(crate) is_of_cells: bool,
@@ -91,6 +91,24 @@ impl Candidate {
         format!("{owner}{}{part}", self.name)
     }
 
+    /// Whether its numbers tell points, cells or pieces apart, or which of them are valid, by its name: `vtkOriginalPointIds`, `GlobalNodeId`,
+    /// `cell_ids`, `GLOBAL_IDS_POINTS`.
+    fn is_bookkeeping(&self) -> bool {
+        const ENDINGS: [&str; 8] = ["Id", "Ids", "ID", "IDs", "_id", "_ids", "_ID", "_IDS"];
+        let name = self.name.as_str();
+        let is_of_vtk = name.starts_with("vtk") || name.starts_with("GLOBAL_IDS_") || name.starts_with("PEDIGREE_IDS_");
+        is_of_vtk || ENDINGS.iter().any(|ending| name.ends_with(ending)) || ["id", "ids"].contains(&name)
+    }
+
+    /// The name of the column of a mesh that shows it; `None` of colours.
+    fn column_name(&self, all: &[Self]) -> Option<String> {
+        if self.numbers > 1 && self.is_field() {
+            return None;
+        }
+        let name = self.offered_name(all);
+        Some(name.strip_prefix(OF_CELLS).map_or(name.clone(), |name| format!("face:{name}")))
+    }
+
     /// The length of the vectors, if it has such.
     fn magnitude(&self) -> Option<Value> {
         self.is_vector().then_some(Value::Magnitude(self.numbers))
@@ -111,6 +129,30 @@ impl Candidate {
         let number = axis.map(|axis| axis as u64).or_else(|| part.parse().ok()).filter(|i| *i < self.numbers)?;
         Some(Some(Value::Number(number)))
     }
+}
+
+/// The rank of the array that is shown where nobody names one: the active scalars of the file, else its active vectors, else the first array of one
+/// number a tuple, or of colours, else the first vector. Arrays of numbers of points and cells come behind all others. `None` without arrays.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+fn usual(all: &[Candidate]) -> Option<usize> {
+    let position = |fits: &dyn Fn(&Candidate) -> bool| all.iter().position(fits);
+    let tells = |array: &Candidate| !array.is_bookkeeping();
+    position(&|array| tells(array) && array.is_named && !array.is_vector())
+        .or_else(|| position(&|array| tells(array) && array.is_named))
+        .or_else(|| position(&|array| tells(array) && array.is_field()))
+        .or_else(|| position(&|array| tells(array) && array.is_vector()))
+        .or_else(|| position(&|array| array.is_named && !array.is_vector()))
+        .or_else(|| position(&Candidate::is_field))
+        .or_else(|| position(&Candidate::is_vector))
+        .or(if all.is_empty() { None } else { Some(0) })
+}
+
+/// The name of the column of a mesh that is shown where nobody names one: as of a volume where the mesh is the surface of bodies, else the active
+/// attribute of the file alone.
+#[cfg(any(feature = "vti", feature = "vtk"))]
+pub(crate) fn shown_column(all: &[Candidate], has_bodies: bool) -> Option<String> {
+    let shown = &all[usual(all)?];
+    if has_bodies || shown.is_named && !shown.is_bookkeeping() { shown.column_name(all) } else { None }
 }
 
 /// The array that is the field: the one that `params` name, else the one that the file does, else the first of one number a tuple, or of
@@ -150,10 +192,7 @@ pub(crate) fn chosen_array(
             )
         });
     }
-    let found = all.iter().position(|array| array.is_named && !array.is_vector());
-    let found = found.or_else(|| all.iter().position(Candidate::is_field));
-    let found = found.or_else(|| all.iter().position(Candidate::is_vector));
-    let Some(rank) = found.or(if all.is_empty() { None } else { Some(0) }) else { return Ok(None) };
+    let Some(rank) = usual(all) else { return Ok(None) };
     let shown = all[rank].offered_name(all);
     let others = names(rank);
     if !others.is_empty() {

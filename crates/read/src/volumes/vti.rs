@@ -290,25 +290,15 @@ fn chosen<'a, 'i>(
     params: &ReadParams,
     notes: &mut Notes,
 ) -> Result<Option<ChosenArray<'a, 'i>>, ReadError> {
-    let data: Vec<_> = ["PointData", "CellData"].into_iter().filter_map(|name| child(piece, name)).collect();
-    let mut all = Vec::new();
-    let first = data.iter().find(|data| arrays(**data).next().is_some()).copied();
-    for data in &data {
+    for data in data_of(piece) {
         let named = data.attribute("Scalars");
-        let is_there = arrays(*data).any(|array| array.attribute("Name") == named);
-        if let Some(named) = named.filter(|_| !is_there && arrays(*data).next().is_some()) {
+        let is_there = arrays(data).any(|array| array.attribute("Name") == named);
+        if let Some(named) = named.filter(|_| !is_there && arrays(data).next().is_some()) {
             let named = escaped(named.as_bytes(), 40);
             notes.remark(format!("there is no array '{named}', which Scalars names: another is read"));
         }
-        for array in arrays(*data).filter(|array| array.attribute("Name") != Some(GHOSTS)) {
-            let is_named = first == Some(*data) && named.is_some() && array.attribute("Name") == named;
-            let name = name(array);
-            let kind = kind(array).ok();
-            let is_of_cells = data.has_tag_name("CellData");
-            all.push((array, Candidate { name, numbers: components(array)?, kind, is_named, is_of_cells }));
-        }
     }
-    let (nodes, candidates): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+    let (nodes, candidates) = offered(piece)?;
     let chosen = chosen_array(&candidates, place(piece), params, notes)?;
     let is_of_cells =
         |array: Node<'_, '_>| array.parent_element().is_some_and(|parent| parent.has_tag_name("CellData"));
@@ -316,6 +306,35 @@ fn chosen<'a, 'i>(
         let array = nodes[chosen.rank];
         ChosenArray { array, is_of_cells: is_of_cells(array), value: chosen.value }
     }))
+}
+
+/// The elements of a piece that have the arrays of its points and of its cells.
+fn data_of<'a, 'i>(piece: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    ["PointData", "CellData"].into_iter().filter_map(move |name| child(piece, name))
+}
+
+/// The arrays of a piece that can be a field, those of points before those of cells, and the same as far as choosing needs them.
+fn offered<'a, 'i>(piece: Node<'a, 'i>) -> Result<(Vec<Node<'a, 'i>>, Vec<Candidate>), ReadError> {
+    let mut nodes = Vec::new();
+    let mut candidates = Vec::new();
+    for data in data_of(piece) {
+        let is_active = |array: Node<'_, '_>| {
+            let named =
+                |attribute: &str| data.attribute(attribute).is_some_and(|name| array.attribute("Name") == Some(name));
+            named("Scalars") || named("Vectors")
+        };
+        for array in arrays(data).filter(|array| array.attribute("Name") != Some(GHOSTS)) {
+            nodes.push(array);
+            candidates.push(Candidate {
+                name: name(array),
+                numbers: components(array)?,
+                kind: kind(array).ok(),
+                is_named: is_active(array),
+                is_of_cells: data.has_tag_name("CellData"),
+            });
+        }
+    }
+    Ok((nodes, candidates))
 }
 
 /// Names the arrays that are not used.

@@ -155,6 +155,37 @@ impl Kind {
         }
     }
 
+    /// Calls `each` with the points around every face of a cell that is a face or several, in the order of its points; returns false for other cells.
+    pub(super) fn each_face<E>(
+        &self,
+        corners: &[u32],
+        mut each: impl FnMut(&[u32]) -> Result<(), E>,
+    ) -> Result<bool, E> {
+        match self.shape {
+            Shape::Face => each(self.drawn(corners))?,
+            Shape::Faces(parts) => {
+                for part in parts {
+                    let corners: Vec<u32> = part.iter().map(|rank| corners[usize::from(*rank)]).collect();
+                    each(&corners)?;
+                }
+            }
+            Shape::CurvedFace => {
+                let half = corners.len() / 2;
+                let around = corners[..half].iter().zip(&corners[half..]).flat_map(|(a, b)| [*a, *b]);
+                each(&around.collect::<Vec<_>>())?;
+            }
+            // Its second row runs the other way.
+            Shape::Pixel => each(&[corners[0], corners[1], corners[3], corners[2]])?,
+            Shape::Strip => {
+                for (k, t) in corners.windows(3).enumerate() {
+                    each(&if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })?;
+                }
+            }
+            Shape::Points | Shape::Hidden | Shape::Line | Shape::Body(_) | Shape::Polyhedron => return Ok(false),
+        }
+        Ok(true)
+    }
+
     /// Those of the points of a cell that are drawn.
     pub(super) fn drawn<'c>(&self, points: &'c [u32]) -> &'c [u32] {
         match self.points {

@@ -5,14 +5,15 @@ use super::data::Encoding;
 use super::extents;
 use super::piece::Piece;
 use super::{
-    ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, place, sizes, warn_of_part,
-    wrong,
+    ChosenArray, HINT, arrays, child, chosen, components, extent, kind, name, not_used, offered, place, sizes,
+    warn_of_part, wrong,
 };
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::meshes::named_arrays::{NamedArrays, SurfaceArray};
 use crate::reading::Reading;
 use crate::volumes::cells::{self, Cells, Field, Numbers, PointColumns, structured};
+use crate::volumes::selection::shown_column;
 use crate::volumes::voxels::Kind;
 use roxmltree::Node;
 use splat_core::text::{counted, escaped};
@@ -62,7 +63,9 @@ pub(super) fn read(
     let dims = pieces.lattice(&cells)?;
     let mut field = Field::One;
     let mut columns = PointColumns::default();
-    if cells.has_bodies() {
+    let has_bodies = cells.has_bodies();
+    let is_volume = has_bodies && !reading.params.surfaces;
+    if is_volume {
         if let Some(chosen) = pieces.chosen(reading)? {
             let array = chosen.array;
             let selection = chosen.selection(reading.params, &mut reading.notes)?;
@@ -70,7 +73,7 @@ pub(super) fn read(
             field = cells::field(&numbers, &selection, &name(array), !chosen.is_of_cells, place(array), reading)?;
         }
     } else {
-        if let Some(array) = pieces.common(normals_of) {
+        if let Some(array) = pieces.common(normals_of).filter(|_| !has_bodies) {
             columns.normal = cells::normals(&pieces.joined(array, &mut used, reading)?);
         }
         if let Some(array) = pieces.common(colors_of) {
@@ -79,11 +82,15 @@ pub(super) fn read(
             columns.opacity = cells::opacities(&numbers, components(array)?, 255.0);
         }
         columns.named = pieces.named(&mut used, reading)?;
+        if columns.color.is_empty() {
+            reading.notes.shown_column = pieces.shown_column(has_bodies)?;
+        }
     }
     let mut datasets: Vec<Node<'_, '_>> = sources.iter().map(|source| source.dataset).collect();
     datasets.dedup();
     datasets.iter().for_each(|dataset| not_used(*dataset, &used, &mut reading.notes));
-    if let Some(dims) = dims
+    if is_volume
+        && let Some(dims) = dims
         && let Some(grid) = structured::straight(&cells.points, dims, &field, reading)?
     {
         return Ok(Loaded::Grid(grid));
@@ -130,14 +137,25 @@ impl<'e, 'a, 'i> Pieces<'e, 'a, 'i> {
 
     /// The array that is the field: of the first piece that has bodies and arrays, as what has none may have other ones.
     fn chosen(&self, reading: &mut Reading<'_>) -> Result<Option<ChosenArray<'a, 'i>>, ReadError> {
+        let Some(first) = self.first_with_arrays(true) else { return Ok(None) };
+        chosen(first.node, reading.params, &mut reading.notes).map_err(|e| in_file(first.file, e))
+    }
+
+    /// The column of a mesh that is shown where nobody names one.
+    fn shown_column(&self, has_bodies: bool) -> Result<Option<String>, ReadError> {
+        let Some(first) = self.first_with_arrays(has_bodies) else { return Ok(None) };
+        let offered = offered(first.node).map_err(|e| in_file(first.file, e))?;
+        Ok(shown_column(&offered.1, has_bodies))
+    }
+
+    /// The first piece that has arrays; with `has_bodies` of those with bodies.
+    fn first_with_arrays(&self, has_bodies: bool) -> Option<&Piece<'e, 'a, 'i>> {
         let has_arrays = |name: &&str, piece: &Piece<'_, 'a, 'i>| {
             child(piece.node, name).is_some_and(|data| arrays(data).next().is_some())
         };
         let has_data =
             |piece: &&Piece<'_, 'a, 'i>| ["PointData", "CellData"].iter().any(|name| has_arrays(name, piece));
-        let first = self.list.iter().filter(|piece| piece.has_bodies).find(has_data);
-        let Some(first) = first else { return Ok(None) };
-        chosen(first.node, reading.params, &mut reading.notes).map_err(|e| in_file(first.file, e))
+        self.list.iter().filter(|piece| piece.has_bodies || !has_bodies).find(has_data)
     }
 
     /// The array of the points of the first piece that has one, as `find` finds it; of blocks all that have points have to have such a one.

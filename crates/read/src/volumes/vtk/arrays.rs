@@ -5,7 +5,7 @@ use crate::error::{Place, ReadError};
 use crate::reading::Reading;
 use crate::text::{Line, Lines, Word, Words};
 use crate::volumes::cells::Numbers;
-use crate::volumes::selection::{Candidate, GHOSTS, Selection, Value, chosen_array};
+use crate::volumes::selection::{Candidate, GHOSTS, Selection, Value, chosen_array, shown_column};
 use crate::volumes::voxels::Kind;
 use crate::{Notes, ReadParams};
 use splat_core::text::{counted, escaped};
@@ -150,6 +150,18 @@ impl<'a> Arrays<'a> {
         params: &ReadParams,
         notes: &mut Notes,
     ) -> Result<Option<(&Array, Option<Value>)>, ReadError> {
+        let (offered, candidates) = self.offered();
+        let place = offered.first().map_or(Place::File, |array| array.place);
+        Ok(chosen_array(&candidates, place, params, notes)?.map(|chosen| (offered[chosen.rank], chosen.value)))
+    }
+
+    /// The column of a mesh that is shown where nobody names one.
+    pub(super) fn shown_column(&self, has_bodies: bool) -> Option<String> {
+        shown_column(&self.offered().1, has_bodies)
+    }
+
+    /// The arrays that can be a field, those of points before those of cells, and the same as far as choosing needs them.
+    fn offered(&self) -> (Vec<&Array>, Vec<Candidate>) {
         let is_field = |array: &&Array| {
             matches!(array.role, Role::Scalars | Role::Colors | Role::Vectors | Role::Field) && array.name != GHOSTS
         };
@@ -163,9 +175,8 @@ impl<'a> Arrays<'a> {
             is_named: Some(array.owner) == first && matches!(array.role, Role::Scalars | Role::Colors),
             is_of_cells: array.owner == Owner::Cells,
         };
-        let candidates: Vec<Candidate> = offered.iter().map(candidate).collect();
-        let place = offered.first().map_or(Place::File, |array| array.place);
-        Ok(chosen_array(&candidates, place, params, notes)?.map(|chosen| (offered[chosen.rank], chosen.value)))
+        let candidates = offered.iter().map(candidate).collect();
+        (offered, candidates)
     }
 
     /// Takes a line, and passes over the arrays that it announces.

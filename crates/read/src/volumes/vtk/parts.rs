@@ -99,14 +99,16 @@ pub(super) fn read(source: &Source<'_>, dataset: Dataset, reading: &mut Reading<
     let mut field = Field::One;
     let mut columns = PointColumns::default();
     let mut used = Vec::new();
-    if cells.has_bodies() {
+    let has_bodies = cells.has_bodies();
+    let is_volume = has_bodies && !reading.params.surfaces;
+    if is_volume {
         if let Some((array, value)) = arrays.chosen(reading.params, &mut reading.notes)? {
             used.push(array.place);
             let selection = array.selection(value, array.place, reading.params, &mut reading.notes)?;
             field = source.field(array, &selection, &cells, reading)?;
         }
     } else {
-        if let Some(array) = arrays.normals() {
+        if let Some(array) = arrays.normals().filter(|_| !has_bodies) {
             used.push(array.place);
             columns.normal = cells::normals(&source.of_points(array, &cells, reading)?);
         }
@@ -118,9 +120,13 @@ pub(super) fn read(source: &Source<'_>, dataset: Dataset, reading: &mut Reading<
             columns.opacity = cells::opacities(&numbers, array.numbers, top);
         }
         columns.named = source.named(&cells, &mut used, reading)?;
+        if columns.color.is_empty() {
+            reading.notes.shown_column = arrays.shown_column(has_bodies);
+        }
     }
     reading.notes.not_used(arrays.all().filter(|a| !used.contains(&a.place)).map(|a| a.name.as_bytes()));
-    if let Some(dims) = source.dims
+    if is_volume
+        && let Some(dims) = source.dims
         && let Some(grid) = structured::straight(&cells.points, dims, &field, reading)?
     {
         return Ok(Loaded::Grid(grid));
