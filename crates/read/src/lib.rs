@@ -68,6 +68,7 @@ pub use reading::{Fix, Mended, NamedColumn, Notes, Textures};
 /// The nouns that this crate takes and returns.
 pub use splat_core;
 
+use format::up::unpacked_beginning;
 use format::{Format, folder, format_of, is_raw, unread};
 #[cfg(feature = "exr")]
 use images::openexr;
@@ -273,7 +274,8 @@ pub fn files_of(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
 fn whole_folder(path: &Path, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
     reading.go_on()?;
     let files = folder::files(path)?;
-    if files.iter().take(LOOKED_AT).any(|file| dicom::is_dicom(&unread::beginning(file))) {
+    let is_slice = |file: &PathBuf| unpacked_beginning(file).is_some_and(|head| dicom::is_dicom(&head));
+    if files.iter().take(LOOKED_AT).any(is_slice) {
         "Dicom".clone_into(&mut reading.notes.format);
         let loaded = dicom::read(path, None, reading).map(Loaded::Grid)?;
         return finished(loaded, reading);

@@ -1,6 +1,7 @@
 //! Series of DICOM: order, places, values, and what is refused.
 
 use crate::read_samples::dicom::{Dicom, frames};
+use crate::read_samples::gzip;
 use read::{Fault, Loaded, Notes, ReadError, ReadParams, file};
 use splat_core::glam::DVec3;
 use splat_core::{Grid, UpAxis};
@@ -198,4 +199,20 @@ fn links_out_of_the_folder_are_no_slices() {
     // A file that is named is read wherever it lies.
     let (grid, _) = read(&path.join("IM2"), &ReadParams::default()).unwrap();
     assert_eq!(grid.dims[2], 3);
+}
+
+#[test]
+fn slices_may_be_in_gzip_and_a_segmentation_of_bits_is_called_so() {
+    let slices: Vec<Dicom> = (0..3).map(Dicom::at).collect();
+    let plain = volume(&folder("plain", &slices)).0;
+    let path = folder("gzip", &slices);
+    for i in 0..3 {
+        let file = path.join(format!("IM{i}"));
+        std::fs::write(path.join(format!("IM{i}.dcm.gz")), gzip(&std::fs::read(&file).unwrap())).unwrap();
+        std::fs::remove_file(&file).unwrap();
+    }
+    assert_eq!(volume(&path).0, plain);
+    assert_eq!(volume(&path.join("IM1.dcm.gz")).0, plain);
+    let bits = refused("bits", &[Dicom { bits: [1, 1], ..Dicom::at(0) }]);
+    assert!(bits.contains("found a segmentation of 1 bit a pixel") && !bits.contains("damaged"), "{bits}");
 }

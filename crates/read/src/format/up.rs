@@ -15,7 +15,7 @@ const HEADER: u64 = 1 << 16;
 /// The axis that points up by a file's format; `None` where that says nothing of it, and for a file that cannot be read, which
 /// [`crate::file()`] has the words for. Only the file's beginning is looked at.
 pub fn stated_up_axis(path: &Path) -> Option<UpAxis> {
-    of_content(path, &beginning(path)?)
+    of_content(path, &unpacked_beginning(path)?)
 }
 
 /// The same, y where nothing is stated.
@@ -23,16 +23,20 @@ pub fn up_axis(path: &Path) -> UpAxis {
     stated_up_axis(path).unwrap_or_default()
 }
 
-fn beginning(path: &Path) -> Option<Vec<u8>> {
+/// The first bytes of a file, unpacked where it is gzip; of a folder those of the file that tells its format.
+pub(crate) fn unpacked_beginning(path: &Path) -> Option<Vec<u8>> {
     // Asked before opening: opening a FIFO waits for its writer.
     let about = std::fs::metadata(path).ok()?;
     if about.is_dir() {
         let files = folder::files(path).ok()?;
         if let Some(description) = folder::sog_description(&files) {
-            return beginning(description);
+            return unpacked_beginning(description);
         }
         // Slices of DICOM lie in a patient's space.
-        return files.iter().take(LOOKED_AT).find_map(|file| beginning(file).filter(|content| is_dicom(content)));
+        return files
+            .iter()
+            .take(LOOKED_AT)
+            .find_map(|file| unpacked_beginning(file).filter(|content| is_dicom(content)));
     }
     if !about.is_file() {
         return None;

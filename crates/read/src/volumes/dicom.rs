@@ -15,7 +15,7 @@ use crate::reading::Reading;
 use crate::stream::input::{self, Stream};
 use crate::volumes::selection::Selection;
 pub(crate) use elements::is_dicom;
-use elements::{DAMAGED, Elements, Packing, Tag};
+use elements::{CONVERT, DAMAGED, Elements, Packing, Tag};
 use splat_core::Grid;
 use splat_core::glam::{DMat3, DVec3};
 use splat_core::text::{counted, escaped};
@@ -37,6 +37,8 @@ const TILT: f64 = 1e-3;
 const LONGEST: u16 = 16384;
 /// Bytes that tell the format.
 const HEAD: usize = 132;
+/// The first bytes of gzip, in which a slice may lie.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// Bytes of memory that a frame takes, and that what is found in a group takes for each of its bytes.
 const BYTES_OF_A_FRAME: u64 = 2 * BYTES_OF_A_SLICE;
 const MOST_OF_AN_ELEMENT: u64 = 6;
@@ -194,6 +196,9 @@ fn with_elements<T: Default>(
 ) -> Result<T, ReadError> {
     let params = ReadParams { memory: params.memory.part(), ..params.clone() };
     let mut stream = Stream::open(file, &params)?;
+    if stream.peek(GZIP.len())? == GZIP {
+        stream = stream.gunzip();
+    }
     if !is_dicom(stream.peek(HEAD)?) {
         return Ok(T::default());
     }
@@ -340,9 +345,19 @@ fn numbers(elements: &Elements<'_>) -> Result<Numbers, ReadError> {
     let bits = elements.short(STORED).unwrap_or(allocated);
     let highest = elements.short(HIGHEST).unwrap_or(bits.saturating_sub(1));
     let is_whole = [8, 16, 32].contains(&allocated) && (1..=allocated).contains(&bits);
+    if allocated == 1 {
+        let hint = "convert it to NRRD, such as with `segimage2itkimage` of dcmqi or with 3D Slicer";
+        return Err(ReadError::input(
+            Place::File,
+            "numbers of 8, 16 or 32 bits",
+            "a segmentation of 1 bit a pixel",
+            hint,
+        ));
+    }
     if !(is_whole && highest < allocated && highest + 1 >= bits) {
+        let hint = if allocated == 0 { DAMAGED } else { CONVERT };
         let found = format!("{bits} of {allocated}, the highest {highest}");
-        return Err(ReadError::input(Place::File, "bits of a number within 8, 16 or 32", found, DAMAGED));
+        return Err(ReadError::input(Place::File, "bits of a number within 8, 16 or 32", found, hint));
     }
     let is_signed = elements.short(IS_SIGNED) == Some(1);
     let below = u32::from(highest + 1 - bits);

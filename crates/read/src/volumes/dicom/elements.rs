@@ -7,7 +7,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 pub(super) const DAMAGED: &str = "the file is truncated or damaged; fetch it again";
-const CONVERT: &str = "convert the series, such as with `dcm2niix FOLDER`, or unpack it: `gdcmconv --raw IN OUT`";
+pub(super) const CONVERT: &str =
+    "convert the series, such as with `dcm2niix FOLDER`, or unpack it: `gdcmconv --raw IN OUT`";
 
 /// Bytes before the mark, the mark, and where elements begin.
 const PREAMBLE: usize = 128;
