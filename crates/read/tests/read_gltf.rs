@@ -78,14 +78,8 @@ fn strips_fans_and_lists_with_and_without_indices() {
     assert!((area(&list) - 2.0).abs() < 1e-5);
     assert!((area(&unindexed) - 4.0).abs() < 1e-5);
     refused(&with(r#""mode":5"#, r#""mode":9"#), "a.glb: expected a mode from 0 to 6, found 9");
-    // Lines are named, points alone are points.
-    assert!(
-        bytes("a.glb", &with(r#""mode":5"#, r#""mode":3"#), &ReadParams::default(), None)
-            .unwrap()
-            .1
-            .unused
-            .contains(&"lines".to_owned())
-    );
+    // Lines alone are tubes, points alone are points.
+    assert!(triangles(r#""mode":5"#, r#""mode":3"#).triangles.len() > 2);
     let Loaded::Points(points) = load("a.glb", &with(r#""mode":5"#, r#""mode":0"#)).unwrap() else {
         panic!("no points")
     };
@@ -276,4 +270,65 @@ fn files_that_it_names_lie_in_its_folder_or_below() {
         assert!(error.expected.starts_with("buffer 0: a file in the same folder or below"), "{error}");
     }
     assert_eq!(opened("missing.bin", r#""uri":"colours.png""#).unwrap_err().fault, Fault::FileSystem);
+}
+
+/// Floats as a buffer, and a description of one node that shows a mesh of these accessors.
+fn of_floats(floats: &[f32], node: &str, primitive: &str, accessors: &str) -> Vec<u8> {
+    let binary: Vec<u8> = floats.iter().flat_map(|float| float.to_le_bytes()).collect();
+    let json = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0{node}}}],\
+         \"meshes\":[{{\"primitives\":[{primitive}]}}],\"buffers\":[{{\"byteLength\":{}}}],\
+         \"bufferViews\":[{{\"buffer\":0,\"byteLength\":{}}}],\"accessors\":[{accessors}]}}",
+        binary.len(),
+        binary.len()
+    );
+    glb(&json, &binary)
+}
+
+fn accessor(offset: usize, count: usize, shape: &str) -> String {
+    format!(
+        "{{\"bufferView\":0,\"byteOffset\":{offset},\"componentType\":5126,\"count\":{count},\"type\":\"{shape}\"}}"
+    )
+}
+
+#[test]
+fn copies_of_a_mesh_lie_where_its_node_says() {
+    let triangle = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    // Moved; moved, twice as large and turned by a half about z.
+    let moved = [5.0, 0.0, 0.0, 0.0, 7.0, 0.0];
+    let turned = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0];
+    let scaled = [1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+    let floats = [&triangle[..], &moved, &turned, &scaled].concat();
+    let accessors = |count: usize| {
+        [accessor(0, 3, "VEC3"), accessor(36, 2, "VEC3"), accessor(60, 2, "VEC4"), accessor(92, count, "VEC3")]
+            .join(",")
+    };
+    let node = ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"TRANSLATION\":1,\"ROTATION\":2,\"SCALE\":3,\"_TONE\":3}}}";
+    let primitive = "{\"attributes\":{\"POSITION\":0}}";
+    let (mesh, notes) = read("a.glb", &of_floats(&floats, node, primitive, &accessors(2)));
+    let found: Vec<Vec3> = mesh.position.iter().map(|p| (mesh.origin + p.as_dvec3()).as_vec3()).collect();
+    let expected =
+        [[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0], [0.0, 7.0, 0.0], [-2.0, 7.0, 0.0], [0.0, 5.0, 0.0]];
+    assert!(found.iter().zip(expected.map(Vec3::from)).all(|(f, e)| f.distance(e) < 1e-6), "{found:?}");
+    assert_eq!((found.len(), notes.unused), (6, vec!["_TONE of copies".to_owned()]));
+    let unlike = of_floats(&floats, node, primitive, &accessors(1));
+    refused(&unlike, "a.glb: expected 2 entries of each attribute of copies, found 1");
+}
+
+#[test]
+fn lines_alone_become_tubes_and_beside_faces_are_named() {
+    let square = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0];
+    let lines = |mode: u32| {
+        let primitive = format!("{{\"mode\":{mode},\"attributes\":{{\"POSITION\":0}}}}");
+        read("a.glb", &of_floats(&square, "", &primitive, &accessor(0, 4, "VEC3")))
+    };
+    // Rings of six vertices: at both ends of two lines, along a strip, and once more at the end of a loop.
+    for (mode, rings, said) in [(1, 4, "2 lines"), (2, 5, "1 line"), (3, 4, "1 line")] {
+        let (mesh, notes) = lines(mode);
+        assert_eq!(mesh.position.len(), 6 * rings, "{mode}");
+        assert!(notes.remarks[0].starts_with(&format!("{said} drawn as tubes")), "{:?}", notes.remarks);
+    }
+    let both = "{\"mode\":3,\"attributes\":{\"POSITION\":0}},{\"mode\":5,\"attributes\":{\"POSITION\":0}}";
+    let (mesh, notes) = read("a.glb", &of_floats(&square, "", both, &accessor(0, 4, "VEC3")));
+    assert_eq!((mesh.triangles.len(), notes.unused), (2, vec!["lines".to_owned()]));
 }

@@ -192,7 +192,8 @@ fn faults(facts: &Facts, text: &mut Lines) {
     let there = found.into_iter().filter(|(count, ..)| *count > 0);
     let there: Vec<String> = there.map(|(count, noun, what)| counted(count, noun) + &what).collect();
     if there.is_empty() {
-        text.add("faults", "none: a closed surface");
+        let has_faces = facts.counts.iter().any(|(name, count)| *name == "triangles" && *count > 0);
+        text.add("faults", if has_faces { "none: a closed surface" } else { "no face" });
     }
     there.iter().for_each(|fault| text.add("fault", fault));
 }

@@ -14,6 +14,7 @@ mod nodes;
 mod primitive;
 
 use super::paint::Paint;
+use super::tubes::Tubes;
 use crate::Loaded;
 use crate::error::{Place, ReadError};
 use crate::points::origin;
@@ -24,7 +25,7 @@ use accessor::{Buffers, missing};
 use document::{Document, Primitive};
 use material::Paints;
 use nodes::Instance;
-use primitive::{POINTS, Surface};
+use primitive::{LINE_STRIP, LINES, POINTS, Surface};
 use splat_core::glam::Vec3;
 use splat_core::text::escaped;
 use splat_core::{Mesh, RawPoints};
@@ -34,11 +35,12 @@ const HINT: &str = "the file is damaged, or was written wrongly; try a glTF vali
 
 /// Extensions that may be required: those that are read, those that change neither shapes nor base colours, and kinds of images, without
 /// which surfaces have the factors of their colours.
-const UNDERSTOOD: [&str; 27] = [
+const UNDERSTOOD: [&str; 28] = [
     gaussians::EXTENSIONS[0],
     gaussians::EXTENSIONS[1],
     gaussians::EXTENSIONS[2],
     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
     "KHR_texture_basisu",
     "EXT_texture_webp",
     "EXT_texture_avif",
@@ -82,6 +84,7 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     let buffers = Buffers::load(&document, binary, &beside, reading)?;
     let instances = nodes::instances(&document)?;
     name_unused(&document, &instances, reading);
+    let instances = nodes::with_copies(instances, &buffers, reading)?;
     let primitives = primitives(&document, &instances)?;
     let (splats, primitives): (Vec<_>, Vec<_>) = primitives.into_iter().partition(|(p, _)| gaussians::is_one(p));
     if !splats.is_empty() {
@@ -98,10 +101,11 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
     input::hold("the vertices", vertices.saturating_mul(primitive::BYTES_PER_VERTEX), reading.params)?;
     let mut paints = Paints::new(&document, &buffers, &beside);
     let mut surface = Surface::default();
+    let has_faces = primitives.iter().any(|(p, _)| !matches!(p.mode, Some(POINTS | LINES..=LINE_STRIP)));
     for (primitive, instance) in primitives {
         reading.go_on()?;
         match primitive.mode {
-            Some(1..=3) => reading.notes.not_used([&b"lines"[..]]),
+            Some(LINES..=LINE_STRIP) if has_faces => reading.notes.not_used([&b"lines"[..]]),
             Some(POINTS) if is_mesh => reading.notes.not_used([&b"points"[..]]),
             _ => surface.add(primitive, &instance.scene_from_mesh, &buffers, &mut paints, reading)?,
         }
@@ -112,8 +116,15 @@ pub(crate) fn read(content: &[u8], place: Option<&Path>, reading: &mut Reading<'
 }
 
 fn loaded(surface: Surface, is_mesh: bool, reading: &mut Reading<'_>) -> Result<Loaded, ReadError> {
-    let Surface { position, normal, triangles, painting, is_tinted } = surface;
+    let Surface { position, normal, triangles, lines, painting, is_tinted } = surface;
     let (origin, position) = origin::relative(&position, Place::File, |i| format!("vertex {i}"))?;
+    let of_lines = || lines.iter().enumerate().map(|(rank, line)| (rank as u32, line.as_slice()));
+    if let Some(tubes) = Tubes::around(&position, of_lines(), reading)? {
+        let is_painted = is_tinted || painting.paints.iter().any(|paint| paint.factor != [1.0; 4]);
+        let color = if is_painted { painting.bare_colors() } else { Vec::new() };
+        let vertices = Mesh { origin, color: tubes.of_vertices(&color), ..Mesh::default() };
+        return Ok(Loaded::Mesh(tubes.into_mesh(vertices, reading)));
+    }
     let mesh = Mesh { origin, position, normal, triangles, ..Mesh::default() };
     // All white is no colour.
     let is_painted = is_tinted || !painting.paints.iter().all(Paint::is_none);
@@ -170,7 +181,7 @@ fn name_unused(document: &Document, instances: &[Instance<'_>], reading: &mut Re
         ("other scenes", document.scenes.len() > 1),
     ];
     reading.notes.not_used(stated.iter().filter(|(_, is)| *is).map(|(name, _)| name.as_bytes()));
-    reading.notes.not_used(nodes.iter().flat_map(|n| n.extensions.keys()).map(String::as_bytes));
+    reading.notes.not_used(nodes.iter().flat_map(|n| n.extensions.others.keys()).map(String::as_bytes));
     let primitives = instances.iter().filter_map(|i| document.meshes.get(i.mesh)).flat_map(|m| &m.primitives);
     reading.notes.not_used(primitives.flat_map(|p| p.extensions.others.keys()).map(String::as_bytes));
     if instances.is_empty() {

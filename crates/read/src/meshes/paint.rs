@@ -93,6 +93,16 @@ impl Painting {
         std::array::from_fn(|c| factor[c] * tint[c] * texture[c])
     }
 
+    /// Colours of the vertices without their textures.
+    pub(crate) fn bare_colors(&self) -> Vec<[f32; 3]> {
+        let color = |(vertex, paint): (usize, &u32)| {
+            let tint = self.tint.get(vertex).copied().unwrap_or([1.0; 4]);
+            let factor = self.paints[*paint as usize].factor;
+            std::array::from_fn(|channel| factor[channel] * tint[channel])
+        };
+        self.paint_of.iter().enumerate().map(color).collect()
+    }
+
     fn alpha_of(&self, vertex: u32) -> Alpha {
         self.paints[self.paint_of[vertex as usize] as usize].alpha
     }

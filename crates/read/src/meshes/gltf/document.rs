@@ -50,7 +50,26 @@ pub(super) struct Node {
     /// A quaternion x, y, z, w.
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
-    pub(super) extensions: BTreeMap<String, IgnoredAny>,
+    pub(super) extensions: NodeExtensions,
+}
+
+/// Extensions of a node.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub(super) copies: Option<Copies>,
+    /// Extensions that are not read.
+    #[serde(flatten)]
+    pub(super) others: BTreeMap<String, IgnoredAny>,
+}
+
+/// Copies of the mesh of a node.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Copies {
+    /// Accessors with an entry for each copy: `TRANSLATION`, `ROTATION`, `SCALE`, and others, which change no shape.
+    pub(super) attributes: BTreeMap<String, usize>,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -1,9 +1,11 @@
 //! The nodes of the scene that is shown, each with its place in it.
 
-use super::accessor::missing;
-use super::document::{Document, Node};
+use super::accessor::{Buffers, missing};
+use super::document::{Copies, Document, Node};
 use super::wrong;
 use crate::error::ReadError;
+use crate::reading::Reading;
+use crate::stream::input;
 use splat_core::glam::{DMat4, DQuat, DVec3};
 
 /// A mesh of the scene.
@@ -46,6 +48,76 @@ pub(super) fn instances(document: &Document) -> Result<Vec<Instance<'_>>, ReadEr
         waiting.extend(node.children.iter().rev().map(|i| (*i, scene_from_node)));
     }
     Ok(found)
+}
+
+/// The meshes with the copies that `EXT_mesh_gpu_instancing` makes of them, each in its place.
+pub(super) fn with_copies<'a>(
+    instances: Vec<Instance<'a>>,
+    buffers: &Buffers<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Vec<Instance<'a>>, ReadError> {
+    let mut all = Vec::new();
+    for instance in instances {
+        let Some(copies) = &instance.node.extensions.copies else {
+            all.push(instance);
+            continue;
+        };
+        let places = node_from_copies(copies, buffers, reading)?;
+        input::hold("the copies of a mesh", (all.len() + places.len()) as u64 * BYTES_PER_COPY, reading.params)?;
+        input::reserve(&mut all, places.len())?;
+        let scene_from_node = instance.scene_from_mesh;
+        let copy = |node_from_copy: &DMat4| Instance { scene_from_mesh: scene_from_node * *node_from_copy, ..instance };
+        all.extend(places.iter().map(copy));
+    }
+    Ok(all)
+}
+
+/// Bytes that the place of a copy takes, with its attributes.
+const BYTES_PER_COPY: u64 = (size_of::<Instance<'_>>() + size_of::<DMat4>()) as u64 + 40;
+
+/// The transforms of the copies of a mesh: scaled, then turned, then moved.
+fn node_from_copies(
+    copies: &Copies,
+    buffers: &Buffers<'_>,
+    reading: &mut Reading<'_>,
+) -> Result<Vec<DMat4>, ReadError> {
+    const USED: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
+    let unused = copies.attributes.keys().filter(|name| !USED.contains(&name.as_str()));
+    reading.notes.not_used(
+        unused.map(|name| format!("{name} of copies").into_bytes()).collect::<Vec<_>>().iter().map(Vec::as_slice),
+    );
+    let Some(count) = USED.iter().find_map(|name| copies.attributes.get(*name)).map(|index| buffers.count(*index))
+    else {
+        return Ok(vec![DMat4::IDENTITY]);
+    };
+    input::hold("the copies of a mesh", count * BYTES_PER_COPY, reading.params)?;
+    let vectors =
+        |name: &str| copies.attributes.get(name).map(|index| buffers.vectors::<3>(*index, name, reading)).transpose();
+    let moved = vectors("TRANSLATION")?;
+    let scaled = vectors("SCALE")?;
+    let turned = copies.attributes.get("ROTATION").map(|index| buffers.vectors::<4>(*index, "ROTATION", reading));
+    let turned = turned.transpose()?;
+    let lengths = [moved.as_ref().map(Vec::len), turned.as_ref().map(Vec::len), scaled.as_ref().map(Vec::len)];
+    if let Some(other) = lengths.into_iter().flatten().find(|length| *length as u64 != count) {
+        return Err(wrong(format!("{count} entries of each attribute of copies"), other.to_string()));
+    }
+    let place = |i: usize| {
+        let vector = |of: &Option<Vec<[f32; 3]>>, usual: DVec3| {
+            of.as_ref().map_or(usual, |all| DVec3::from_array(all[i].map(f64::from)))
+        };
+        let rotation = turned.as_ref().map_or(DQuat::IDENTITY, |all| DQuat::from_array(all[i].map(f64::from)));
+        let node_from_copy = DMat4::from_scale_rotation_translation(
+            vector(&scaled, DVec3::ONE),
+            if rotation.length_squared() > 0.0 { rotation.normalize() } else { rotation },
+            vector(&moved, DVec3::ZERO),
+        );
+        if node_from_copy.is_finite() && rotation.length_squared() > 0.0 {
+            Ok(node_from_copy)
+        } else {
+            Err(wrong(format!("a finite place of copy {i}"), "another one".into()))
+        }
+    };
+    (0..count as usize).map(place).collect()
 }
 
 fn parent_from_node(node: &Node, index: usize) -> Result<DMat4, ReadError> {

@@ -12,6 +12,10 @@ use crate::stream::input;
 use splat_core::glam::{DMat3, DMat4, DVec3, Vec3};
 
 pub(super) const POINTS: u32 = 0;
+/// Pairs of points; lines that end where they begin; lines from each point to the next.
+pub(super) const LINES: u32 = 1;
+const LINE_LOOP: u32 = 2;
+pub(super) const LINE_STRIP: u32 = 3;
 const TRIANGLES: u32 = 4;
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
@@ -29,6 +33,8 @@ pub(super) struct Surface {
     pub(super) position: Vec<DVec3>,
     pub(super) normal: Vec<Vec3>,
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Vertices of each line.
+    pub(super) lines: Vec<Vec<u32>>,
     pub(super) painting: Painting,
     /// Whether a vertex has a colour of its own.
     pub(super) is_tinted: bool,
@@ -44,7 +50,7 @@ struct Vertices {
 }
 
 impl Surface {
-    /// Appends a primitive of triangles, or the points of one.
+    /// Appends a primitive of triangles or of lines, or the points of one.
     pub(super) fn add(
         &mut self,
         primitive: &Primitive,
@@ -70,6 +76,12 @@ impl Surface {
         if mode == POINTS {
             return self.append(&vertices, indices.iter().copied(), reading).map(|_| ());
         }
+        if (LINES..=LINE_STRIP).contains(&mode) {
+            let first = self.append(&vertices, 0..count as u32, reading)?;
+            let placed: Vec<u32> = indices.iter().map(|index| first + index).collect();
+            self.add_lines(&placed, mode, reading)?;
+            return Ok(());
+        }
         let mut triangles = triangles(&indices, mode)?;
         if scene_from_mesh.determinant() < 0.0 {
             // Mirrored, it would be inside out.
@@ -91,6 +103,20 @@ impl Surface {
             let at = first as usize + 3 * t;
             self.normal[at..at + 3].fill(flat);
             self.triangles.push([0, 1, 2].map(|k| (at + k) as u32));
+        }
+        Ok(())
+    }
+
+    /// Appends the lines of a primitive of that mode through these vertices.
+    fn add_lines(&mut self, vertices: &[u32], mode: u32, reading: &Reading<'_>) -> Result<(), ReadError> {
+        let count = if mode == LINES { vertices.len() / 2 } else { 1 };
+        let bytes = (self.lines.len() + count) * size_of::<Vec<u32>>() + size_of_val(vertices);
+        input::hold("the lines", bytes as u64, reading.params)?;
+        input::reserve(&mut self.lines, count)?;
+        match mode {
+            LINES => self.lines.extend(vertices.as_chunks::<2>().0.iter().map(|pair| pair.to_vec())),
+            LINE_LOOP => self.lines.push(vertices.iter().chain(vertices.first()).copied().collect()),
+            _ => self.lines.push(vertices.to_vec()),
         }
         Ok(())
     }
