@@ -223,6 +223,14 @@ fn points_as_text_with_and_without_names() {
     refused("a.csv", "x,y,intensity\n1,2,3\n", "a.csv:1: expected columns x, y and z; 'z' is missing");
     refused("a.csv", "x,y,z,X\n1,2,3,4\n", "a.csv:1: expected one column 'x', found several");
     refused("a.xyz", "1 2 3 4 5\n", "a.xyz:1: expected 3, 4, 6 or 7 columns");
+    let hint = |content: &str| load("a.xyz", content.as_bytes()).unwrap_err().hint;
+    assert!(hint(&"1 ".repeat(256)).starts_with("a grid of heights has to become points"));
+    assert!(hint("2\nwater\nO 0 0 0\nH 0 0 1\n").starts_with("of an XMol file of atoms"));
+    // Other names of the coordinates count where no column has the usual one.
+    let of_survey = points("a.csv", "name,x_utm,y_utm,altitude\na,1,2,3\n");
+    assert_eq!(of_survey.position[0].as_dvec3() + of_survey.origin, DVec3::new(1.0, 2.0, 3.0));
+    let both = points("a.csv", "x,y,z,altitude\n1,2,3,9\n");
+    assert_eq!(both.position[0].as_dvec3() + both.origin, DVec3::new(1.0, 2.0, 3.0));
     refused("a.xyz", "0 0 0 255 255 255\n0 0 0 256 0 0\n", "a.xyz:2:7: expected a colour from 0 to 255, found '256'");
     refused("a.pts", "3\n1 2 3\n4 5 6\n", "a.pts:1: expected 3 points, as announced, found 2 points");
     refused("a.xyz", "hello\n1 2 3\n", "a.xyz:1:1: expected x, y and z, names of columns, or a number of points");

@@ -49,7 +49,7 @@ fn a_stack_of_each_packing_type_and_order_has_its_values() {
             ..plain.clone()
         });
     }
-    for meaning in [0, 3] {
+    for meaning in [0, 2, 3] {
         stacks.push(Stack { meaning, ..plain.clone() });
         stacks.push(Stack { meaning, big_endian: true, is_wide: true, ..plain.clone() });
     }

@@ -60,3 +60,14 @@ fn a_folder_of_vtk_js_is_named_once() {
     assert_eq!(said(&index), (found, hint));
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+#[test]
+fn text_in_utf_16_is_called_so() {
+    for (name, big_endian) in [("a.obj", true), ("a.ply", false), ("a.xyz", false), ("a.stl", true)] {
+        let bytes = |c: u16| if big_endian { c.to_be_bytes() } else { c.to_le_bytes() };
+        let content: Vec<u8> = std::iter::once(0xfeff).chain("# v 0 0 0\n".encode_utf16()).flat_map(bytes).collect();
+        let error = load(name, &content).unwrap_err().to_string();
+        assert!(error.contains("expected text in UTF-8, found text in UTF-16"), "{error}");
+        assert!(error.contains("iconv -f UTF-16"), "{error}");
+    }
+}

@@ -150,11 +150,34 @@ pub(crate) fn without_coverage(path: &Path, head: &[u8], format: Option<Format>)
 /// The error for a file whose first bytes are those of a format that is not read, whatever its name says; of archives the
 /// name tells what they are.
 pub(crate) fn by_mark(path: &Path, head: &[u8]) -> Option<ReadError> {
+    if !crate::is_raw(path)
+        && let Some(error) = wide_text(head)
+    {
+        return Some(error);
+    }
     if let Some(error) = json(head) {
         return Some(error);
     }
     let marked = marked(head)?;
     Some(error(by_name(path).unwrap_or(marked)))
+}
+
+/// The error for a text of two bytes a character, which UTF-16 marks at its beginning.
+fn wide_text(head: &[u8]) -> Option<ReadError> {
+    /// Characters that are looked at, of which ASCII has a zero byte each.
+    const LOOKED_AT: usize = 16;
+    let high_byte = match head {
+        [0xfe, 0xff, ..] => 0,
+        [0xff, 0xfe, ..] => 1,
+        _ => return None,
+    };
+    let characters = head[2..].as_chunks::<2>().0;
+    let looked_at = &characters[..characters.len().min(LOOKED_AT)];
+    let is_ascii = !looked_at.is_empty() && looked_at.iter().all(|pair| pair[high_byte] == 0);
+    is_ascii.then(|| {
+        let hint = "save it as UTF-8, such as with `iconv -f UTF-16 -t UTF-8 IN > OUT`";
+        ReadError::input(Place::Byte(0), "text in UTF-8", "text in UTF-16", hint)
+    })
 }
 
 fn marked(head: &[u8]) -> Option<&'static Unread> {

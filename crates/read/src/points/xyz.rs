@@ -31,10 +31,16 @@ const ROLES: [&[&str]; 11] = [
     &["value", "intensity", "scalar", "i"],
     &["opacity", "alpha"],
 ];
+/// Names of x, y and z that count where no column has one of the names above, lower case.
+const OTHER_PLACES: [&[&str]; 3] =
+    [&["x_utm", "utm_x", "utm_easting"], &["y_utm", "utm_y", "utm_northing"], &["altitude", "alt", "elev"]];
 const NORMAL: usize = 3;
 const COLOR: usize = 6;
 const VALUE: usize = 9;
 const OPACITY: usize = 10;
+
+/// Columns above which numbers without names are a grid, and no points.
+const MOST_COLUMNS: usize = 32;
 
 /// Bytes that a point takes while it is read and converted.
 const BYTES_PER_POINT: u64 = 24 + 12 + 12 + 12 + 4 + 4;
@@ -61,7 +67,7 @@ pub(crate) fn read(content: &[u8], params: &ReadParams, notes: &mut Notes) -> Re
                 continue;
             }
             if first.number().is_err() {
-                let roles = named(line, &words)?;
+                let roles = named(line, &words, count.is_some())?;
                 points.is_intensity = is_intensity(&words, &roles);
                 notes.not_used(words.iter().zip(&roles).filter(|(_, r)| r.is_none()).map(|(w, _)| bare(w)));
                 let others = words.iter().zip(&roles).enumerate().map(|(i, (w, role))| (i, bare(w), role.is_some()));
@@ -181,11 +187,19 @@ fn bare<'a>(word: &Word<'a>) -> &'a [u8] {
     word.text.strip_prefix(b"\"").and_then(|n| n.strip_suffix(b"\"")).unwrap_or(word.text)
 }
 
-/// Roles of columns with names; others are read over.
-fn named(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadError> {
+/// Roles of columns with names; others are read over. With `is_counted` a number of points stands before the line.
+fn named(line: Line<'_>, words: &[Word<'_>], is_counted: bool) -> Result<Vec<Option<usize>>, ReadError> {
     let role =
         |w: &Word<'_>| ROLES.iter().position(|names| names.iter().any(|n| bare(w).eq_ignore_ascii_case(n.as_bytes())));
     let mut columns: Vec<Option<usize>> = words.iter().map(role).collect();
+    for (role, names) in OTHER_PLACES.iter().enumerate() {
+        let is_named = |w: &Word<'_>| names.iter().any(|name| bare(w).eq_ignore_ascii_case(name.as_bytes()));
+        if !columns.contains(&Some(role))
+            && let Some(other) = words.iter().position(is_named)
+        {
+            columns[other] = Some(role);
+        }
+    }
     let found: Vec<usize> = columns.iter().flatten().copied().collect();
     if let Some(twice) = (0..ROLES.len()).find(|r| found.iter().filter(|f| *f == r).count() > 1) {
         let expected = format!("one column '{}'", ROLES[twice][0]);
@@ -194,12 +208,12 @@ fn named(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, ReadE
     if let Some(missing) = (0..NORMAL).find(|r| !found.contains(r)) {
         let expected = format!("columns x, y and z; '{}' is missing", ROLES[missing][0]);
         let text = format!("'{}'", splat_core::text::escaped(line.text.trim_ascii(), 60));
-        return Err(ReadError::input(
-            line.place(),
-            expected,
-            text,
-            "name the columns in the first line, or leave it out",
-        ));
+        let hint = if is_counted {
+            "of an XMol file of atoms, which has a number, a comment and lines such as C 0 0 0, replace the first two lines by: element x y z"
+        } else {
+            "name the columns of the coordinates x, y and z in the first line, or leave that line out"
+        };
+        return Err(ReadError::input(line.place(), expected, text, hint));
     }
     // A normal or colour with a missing component is none.
     for group in [NORMAL..COLOR, COLOR..VALUE] {
@@ -226,7 +240,12 @@ fn guessed(line: Line<'_>, words: &[Word<'_>]) -> Result<Vec<Option<usize>>, Rea
         _ => {
             let expected = "3, 4, 6 or 7 columns, or a first line with their names";
             let found = format!("{} columns", words.len());
-            return Err(ReadError::input(line.place(), expected, found, "begin with a line such as: x y z nx ny nz"));
+            let hint = if words.len() > MOST_COLUMNS {
+                "a grid of heights has to become points, a line x y z for each of its numbers; of points name the columns in a first line"
+            } else {
+                "begin with a line such as: x y z nx ny nz"
+            };
+            return Err(ReadError::input(line.place(), expected, found, hint));
         }
     };
     Ok(roles.into_iter().map(Some).collect())

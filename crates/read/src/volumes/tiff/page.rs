@@ -22,6 +22,7 @@ const MOST_PACKED: u64 = 4096;
 const LEAST_PAGE: u64 = 64;
 /// Meanings of a number that is read as it is stored: white is 0, black is 0, a place in a list of colours.
 const WHITE_IS_ZERO: u16 = 0;
+const RED_GREEN_BLUE: u16 = 2;
 const BLACK_IS_ZERO: u64 = 1;
 const IN_PALETTE: u16 = 3;
 /// Bits of `NewSubfileType`: a smaller copy of another page, and a mask.
@@ -194,8 +195,14 @@ impl Pages {
     /// What the numbers of the current page are. Numbers that stand for white or for colours of a list are taken as they are stored.
     fn shape(&mut self, page: usize, reading: &mut Reading<'_>) -> Result<Shape, ReadError> {
         let meaning = self.number(Tag::PhotometricInterpretation).and_then(|meaning| u16::try_from(meaning).ok());
-        if let Some(WHITE_IS_ZERO | IN_PALETTE) = meaning {
+        let has_one_number = self.number(Tag::SamplesPerPixel).is_none_or(|numbers| numbers == 1);
+        let is_grey_after_all = meaning == Some(RED_GREEN_BLUE) && has_one_number;
+        let is_rewritten = matches!(meaning, Some(WHITE_IS_ZERO | IN_PALETTE)) || is_grey_after_all;
+        if is_rewritten {
             match meaning {
+                _ if is_grey_after_all => {
+                    reading.notes.remark("called RGB, with one number a pixel: numbers are read as they are stored")
+                }
                 Some(IN_PALETTE) => reading.notes.remark(LISTED_COLORS),
                 _ => reading.notes.remark("white is stored as 0: numbers are read as they are stored"),
             }
@@ -400,7 +407,9 @@ impl Pages {
 
 /// The error of a page that the decoder refuses.
 fn refused(page: usize, error: &TiffError) -> ReadError {
-    let told = escaped(error.to_string().as_bytes(), 160);
+    let told = error.to_string();
+    // The decoder's own name of the error says nothing of the file.
+    let told = escaped(told.strip_prefix("unsupported error: ").unwrap_or(&told).as_bytes(), 160);
     let found = format!("{told} at page {}", page + 1);
     match error {
         TiffError::UnsupportedError(_) => ReadError::input(Place::File, "a page of a kind that is read", found, UNREAD),
