@@ -349,6 +349,19 @@ fn what_lies_on_no_surface_is_told_from_what_lies_on_one() {
         let share = scattered_share(&surface);
         assert!(share < 0.05, "{share}");
     }
+    // Lines of a scan that lie far apart are one, a ring and a bent wire are none.
+    assert!(scattered_share(&lines(30, 8.0)) < 0.05);
+    let ring = |turns: f64| {
+        let at = |i: u32| {
+            let (sin, cos) = (f64::from(i) / 180.0 * std::f64::consts::TAU * turns).sin_cos();
+            DVec3::new(cos, sin, 0.3 * sin + 0.01 * f64::from(i)).as_vec3()
+        };
+        RawPoints { position: (0..180).map(at).collect(), ..RawPoints::default() }
+    };
+    for turns in [0.9, 1.0, 1.5] {
+        let share = scattered_share(&ring(turns));
+        assert!(share > 0.8, "{turns}: {share}");
+    }
     // All at one place, and places that are no numbers.
     assert_eq!(scattered_share(&RawPoints { position: vec![Vec3::ONE; 100], ..RawPoints::default() }), 0.0);
     assert_eq!(scattered_share(&RawPoints { position: vec![Vec3::NAN; 100], ..RawPoints::default() }), 0.0);

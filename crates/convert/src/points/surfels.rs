@@ -190,7 +190,8 @@ pub fn raw_to_surfels(
 }
 
 /// The share of points that lie on no surface: their ten neighbours lie about as far from the plane that fits them best as along it, as those of particles do
-/// that fill space. Told by some runs of points along a curve through all of them; 0 for fewer than 32 places, and for points that no conversion takes.
+/// that fill space, or they lie along a curve, and no other points beside them. Told by some runs of points along a curve through all of them; 0 for fewer than
+/// 33 places, and for points that no conversion takes.
 ///
 /// ```
 /// use splat_core::RawPoints;
@@ -215,14 +216,41 @@ pub fn scattered_share(points: &RawPoints) -> f64 {
     let runs =
         starts.map(|start| &distinct[start..distinct.len().min(start + RUN)]).filter(|run| run.len() > FEW_PLACES);
     let params = SurfelParams::default();
+    let around = SurfelParams { neighbours: MAX_NEIGHBOURS, ..SurfelParams::default() };
     let mut looked_at = 0;
     let mut scattered = 0;
     for run in runs {
-        let Ok((places, _)) = places(run, &params, false, &Progress::new()) else { continue };
-        looked_at += places.len();
-        scattered += places.iter().filter(|place| place.plane == Place::SCATTERED).count();
+        let Ok((near, _)) = places(run, &params, false, &Progress::new()) else { continue };
+        let Ok((_, neighbours)) = places(run, &around, true, &Progress::new()) else { continue };
+        looked_at += near.len();
+        let is_scattered = |(place, of_place): (u32, &Place)| {
+            of_place.plane == Place::SCATTERED || lies_on_curve(run, place, neighbours.around(place))
+        };
+        scattered += (0..).zip(&near).filter(|place| is_scattered(*place)).count();
     }
     scattered as f64 / looked_at.max(1) as f64
+}
+
+/// Whether a place and its nearest neighbours lie along a curve, and those farther away not beside it, as the next lines of a scan do.
+fn lies_on_curve(places: &[Vec3], place: u32, around: &[u32]) -> bool {
+    /// Nearest neighbours, and what is left beside the direction that they lie along: about 0.1 of their length.
+    const NEAR: usize = 10;
+    const BESIDE_NEAR: f64 = 0.01;
+    /// The same of all neighbours, as the curve may bend: about 0.3.
+    const BESIDE_ALL: f64 = 0.1;
+    let at = places[place as usize].as_dvec3();
+    let beside = |neighbours: &[u32]| {
+        let offsets = || neighbours.iter().map(|other| places[*other as usize].as_dvec3() - at);
+        let mean = offsets().sum::<DVec3>() / (neighbours.len() + 1) as f64;
+        let centred = || offsets().chain([DVec3::ZERO]).map(|offset| offset - mean);
+        let squares: DVec3 = centred().map(|offset| offset * offset).sum();
+        let products: DVec3 =
+            centred().map(|offset| DVec3::new(offset.y * offset.z, offset.z * offset.x, offset.x * offset.y)).sum();
+        // Products of two eigenvalues of the covariance over the square of their sum: 0 on a line, 1/4 where two are alike.
+        let minors = squares.y * squares.z + squares.z * squares.x + squares.x * squares.y - products.length_squared();
+        minors / squares.element_sum().powi(2)
+    };
+    beside(&around[..around.len().min(NEAR)]) < BESIDE_NEAR && beside(around) < BESIDE_ALL
 }
 
 /// Places whose normals point to the side that is asked for, if `turns` says so; those that are kept of the same points, where something is.

@@ -465,6 +465,10 @@ fn raw_points<'a>(
 /// The most splats that balls become unasked: of more points each ball would be about a pixel, and its discs fill the memory.
 const MOST_SPLATS_OF_BALLS: u64 = 4_000_000;
 
+/// Share of points on no surface from which all are balls. Scans of surfaces have less than a twentieth, scans of the ground with trees about a quarter, and
+/// bushes a half, some of whose leaves are flat: their discs would be flakes as wide as the gaps between leaves.
+const SCATTERED: f64 = 1.0 / 3.0;
+
 /// The shape of discs of points whose object states none: balls where opaque points lie on no surface, and their splats are within all limits.
 fn shape_of_most(path: &Path, points: &RawPoints, params: &SurfelParams, context: &ObjectContext<'_>) -> DiscShape {
     let is_plain = points.normal.is_empty() && points.gaussians.is_empty() && points.ready.cloud.is_empty();
@@ -478,7 +482,7 @@ fn shape_of_most(path: &Path, points: &RawPoints, params: &SurfelParams, context
         return DiscShape::default();
     }
     let share = convert::scattered_share(points);
-    if share <= 0.5 {
+    if share <= SCATTERED {
         return DiscShape::default();
     }
     let percent = (100.0 * share).round();
