@@ -45,6 +45,8 @@ const BOTH_SIDES: f64 = 0.01;
 
 /// Hounsfield units between which values are taken for such.
 const UNITS: [f64; 2] = [-500.0, 100.0];
+/// Hounsfield units above which a body has little but bone: above flesh and clotted blood, in the lower half of spongy bone.
+const DENSE: f64 = 220.0;
 /// Hounsfield units below which nothing in a body lies but air: half of the way to water.
 const LIGHTEST: f64 = -500.0;
 
@@ -101,6 +103,14 @@ impl Matter {
     /// range.
     pub(crate) fn has_units(&self) -> bool {
         is_in_units(&self.histogram) && self.air.is_none_or(|air| air < LIGHTEST)
+    }
+
+    /// Whether a tomogram in Hounsfield units has bones: more than a five-hundredth of what is no air is denser than flesh and blood.
+    pub(crate) fn has_bones(&self) -> bool {
+        const FEW: f64 = 0.002;
+        let counts = &self.histogram.counts;
+        let above = |value: f64| sum(&counts[self.histogram.bin(value)..]) as f64;
+        self.histogram.high > DENSE && above(DENSE) > FEW * above(LIGHTEST)
     }
 
     /// The value that parts what is dense from the rest of matter: bone from flesh.

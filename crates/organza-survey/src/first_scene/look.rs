@@ -385,14 +385,14 @@ pub(super) fn stated_labels(grid: &Grid, wish: &Wish) -> Option<Result<Labels, S
     }
 }
 
-/// How a volume looks: a computed field in the colours of a map, a computed tomogram as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
+/// How a volume looks: a computed field in the colours of a map, a computed tomogram that has bones as bones in a film, unless its look has a name. What scanners measure comes in whole numbers, in
 /// Hounsfield units, or in formats that state how the patient lies.
 fn volume_look(grid: &Grid, matter: Option<&Matter>, preset: Option<&Preset>, is_scan: bool) -> Option<Look> {
     let has_units = matter.is_some_and(Matter::has_units);
     let is_field = || !is_scan && !has_units && grid.values.iter().any(|value| value.fract() != 0.0);
     let look = preset.map(|preset| &preset.0);
     match look {
-        None if has_units => Some(Look::Tomogram),
+        None if has_units && matter.is_some_and(Matter::has_bones) => Some(Look::Tomogram),
         None if is_field() => {
             let has_both_signs = matter.is_some_and(|matter| matter.opposite.is_some());
             Some(Look::Field(if has_both_signs { ColorMap::COOLWARM } else { ColorMap::VIRIDIS }))
@@ -485,6 +485,14 @@ mod tests {
         assert_eq!(look(&bytes, None, false), None);
         assert!(matches!(look(&bytes, Some("turbo"), false), Some(Look::Map(_))));
         assert_eq!(look(&units, None, false), Some(Look::Tomogram));
+        // A brain without its skull has no bones: they would be nothing in a dark film.
+        let brain = ball(|r| if r < 20.0 { 22.0 + (r * 7919.0) % 64.0 } else { -1024.0 });
+        let with_a_clot =
+            Grid { values: brain.values.iter().map(|v| if *v > 85.9 { 172.0 } else { *v }).collect(), ..brain };
+        let matter = Matter::from_grid(&with_a_clot).expect("matter");
+        assert!(matter.has_units() && !matter.has_bones(), "{matter:?}");
+        assert_eq!(look(&with_a_clot, None, true), None);
+        assert_eq!(look(&with_a_clot, Some("ct-bone"), true), Some(Look::CtBone));
         let both = ball(|r| libm::exp(-r / 12.0) - libm::exp(-(r - 20.0).abs() / 12.0));
         assert_eq!(look(&both, None, false), Some(Look::Field(ColorMap::COOLWARM)));
         // Two lobes with the range of a tomogram.
