@@ -2,7 +2,7 @@
 
 use crate::facts::bounds_of;
 use crate::preset::Wish;
-use crate::stands::{cloud_stands_along, extent, lies_flat_along, stands_along};
+use crate::stands::{cloud_stands_along, extent, lies_before_camera, lies_flat_along, stands_along};
 use organza::{Context, Error, SourceData, printable, scene};
 use read::{ReadParams, stated_up_axis};
 use splat_core::UpAxis;
@@ -92,7 +92,9 @@ impl DataFile {
                 let stands = match &data {
                     SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) => stands_along(mesh.bounds()),
                     SourceData::Points(points) => {
-                        bounds_of(points.origin, &points.position).and_then(cloud_stands_along)
+                        let stands = bounds_of(points.origin, &points.position).and_then(cloud_stands_along);
+                        let positions = points.position.iter().map(|p| points.origin + p.as_dvec3());
+                        stands.or_else(|| lies_before_camera(positions).then_some(UpAxis::MinusY))
                     }
                     SourceData::Grid(grid) => lies_flat_along(extent(grid)),
                     SourceData::Image(_) => None,

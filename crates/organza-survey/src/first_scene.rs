@@ -13,7 +13,8 @@ use crate::preset::{Preset, Wish};
 use convert::ColorMap;
 use look::{Object, all_stand, check_material, drawn_steps, material_remarks, objects, takes_preset};
 use organza::scene::{
-    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, Scene, name_in_memory, parse, relative_path, root_for,
+    DEFAULT_AZIMUTH, FoundCamera, LoadOptions, ROOT_KEY, Recipe, Scene, UpAxis, name_in_memory, parse, relative_path,
+    root_for,
 };
 use organza::{Context, Error, InMemory, SourceData, printable};
 use splat_core::glam::DVec3;
@@ -138,6 +139,9 @@ fn up_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = 
     let stand = all_stand(data);
     let remark = move |file: &DataFile| {
         let by = match file.stands.filter(|_| stand) {
+            Some(UpAxis::MinusY) => {
+                "-y does, as its points lie before a depth camera at the origin: --up y turns it".to_owned()
+            }
             Some(axis) => format!("{} does, along which it stands: --up y turns it", axis.name()),
             None => "y does: --up z turns it".to_owned(),
         };

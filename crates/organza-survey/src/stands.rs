@@ -23,6 +23,27 @@ pub(crate) fn cloud_stands_along(bounds: DAabb) -> Option<UpAxis> {
     stands_along(bounds).or_else(|| lies_flat_along(bounds))
 }
 
+/// Whether points lie as a depth camera at the origin sees them that looks along z: before it, to both sides of its axis, and within its angle of view.
+/// y points down in the axes of such cameras.
+pub(crate) fn lies_before_camera(points: impl Iterator<Item = DVec3>) -> bool {
+    /// Tangents of half the angles of view that depth cameras have, about 14° to 50°.
+    const LEAST: f64 = 0.25;
+    const MOST: f64 = 1.2;
+    let mut least = DVec3::INFINITY;
+    let mut most = DVec3::NEG_INFINITY;
+    for point in points {
+        if point.z <= 0.0 {
+            return false;
+        }
+        let seen = DVec3::new(point.x / point.z, point.y / point.z, 0.0);
+        least = least.min(seen);
+        most = most.max(seen);
+    }
+    let is_side = |tangent: f64| (0.0..=MOST).contains(&tangent);
+    let are_sides = [-least.x, -least.y, most.x, most.y].into_iter().all(is_side);
+    are_sides && (-least.x).max(most.x) >= LEAST
+}
+
 /// The box of the cells of a volume.
 pub(crate) fn extent(grid: &Grid) -> DAabb {
     let count = grid.dims.map(|n| n as f64);
@@ -61,6 +82,18 @@ mod tests {
             cloud_stands_along(DAabb::new(DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 4.0))),
             Some(UpAxis::Z)
         );
+    }
+
+    #[test]
+    fn what_a_depth_camera_sees_lies_before_it_and_within_its_view() {
+        let wall = |depth: f64, half: f64| {
+            (0..9).map(move |i| DVec3::new(half * f64::from(i % 3 - 1), half * f64::from(i / 3 - 1), depth))
+        };
+        assert!(lies_before_camera(wall(2.0, 1.0)));
+        // A house on a hill, a room around the scanner, a thing beside the axis.
+        assert!(!lies_before_camera(wall(300.0, 20.0)));
+        assert!(!lies_before_camera(wall(2.0, 1.0).chain(wall(-2.0, 1.0))));
+        assert!(!lies_before_camera(wall(2.0, 0.5).map(|point| point + DVec3::X)));
     }
 
     #[test]
