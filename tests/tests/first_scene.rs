@@ -396,3 +396,72 @@ fn info_says_what_a_file_holds_for_people_and_for_programs() {
     assert!((5.0..10.0).contains(&spacing), "{spacing}");
     assert_eq!((&points["duplicate_points"], &points["format"]), (&Value::from(0), &Value::from("Xyz")));
 }
+
+/// A legacy file of three hexahedra in a row along x, with these arrays.
+fn cells(arrays: &str) -> String {
+    let mut text =
+        String::from("# vtk DataFile Version 3.0\na bar\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 16 float\n");
+    for i in 0..16 {
+        writeln!(text, "{} {} {}", i % 4, i / 4 % 2, i / 8).unwrap();
+    }
+    text += "CELLS 3 27\n8 0 1 5 4 8 9 13 12\n8 1 2 6 5 9 10 14 13\n8 2 3 7 6 10 11 15 14\nCELL_TYPES 3\n12\n12\n12\n";
+    text + arrays
+}
+
+#[test]
+fn cells_are_a_body_whose_whole_surface_shows_its_values() {
+    let place = data();
+    let of_cells =
+        |values: &str| cells(&format!("CELL_DATA 3\nSCALARS attribute int 1\nLOOKUP_TABLE default\n{values}\n"));
+    place.write("labels.vtk", of_cells("0 1 2"));
+    place.write("same.vtk", of_cells("3 3 3"));
+    let of_points = "POINT_DATA 16\nSCALARS moved float 1\nLOOKUP_TABLE default\n0 0 .5 1 0 0 .5 1 0 0 .5 1 0 0 .5 1\n";
+    place.write("bar.vtk", cells(of_points));
+    // From the front the bar is three times as wide as high, and opaque from end to end, also where values are 0.
+    for file in ["labels.vtk", "same.vtk", "bar.vtk"] {
+        let front = ["--azimuth", "0", "--elevation", "0", "-o", "a.exr", "--force"];
+        place.expect(0, &[&["render", file], &SIZE[..], &front].concat(), "");
+        let alpha = picture_of(&place.path("a.exr")).opacity();
+        let middle = &alpha[20 * 60..21 * 60];
+        let seen: Vec<f64> = middle.iter().copied().filter(|alpha| *alpha > 0.0).collect();
+        assert!(seen.len() > 45 && seen[1..seen.len() - 1].iter().all(|alpha| *alpha > 0.99), "{file}: {middle:?}");
+    }
+    let init = |options: &[&str]| {
+        let out = place.expect(0, &[&["init"], options, &["-o", "a.toml", "--force"]].concat(), "");
+        let text = String::from_utf8(place.bytes("a.toml")).unwrap();
+        (text, String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    let (text, said) = init(&["labels.vtk"]);
+    assert!(text.contains("mesh = \"labels.vtk\"") && text.contains("color_by = { column = \"attribute\" }"), "{text}");
+    assert!(said.contains("its 3 whole numbers are taken for amounts") && said.contains("--preset labels"), "{said}");
+    let (text, _) = init(&["labels.vtk", "--preset", "labels"]);
+    assert!(text.contains("color_by = { column = \"attribute\", map = \"distinct\" }"), "{text}");
+    let (text, said) = init(&["same.vtk"]);
+    assert!(!text.contains("color_by") && said.contains("`attribute` is 3 throughout"), "{text}{said}");
+    let (text, _) = init(&["bar.vtk", "--preset", "turbo"]);
+    assert!(text.contains("color_by = { column = \"moved\", map = \"turbo\" }"), "{text}");
+    let (text, _) = init(&["bar.vtk", "--preset", "mri"]);
+    assert!(text.contains("volume = \"bar.vtk\""), "{text}");
+    place.expect(2, &["init", "bar.vtk", "--preset", "labels"], "`moved` has other numbers");
+}
+
+#[test]
+fn what_a_depth_camera_saw_is_turned_upright() {
+    let place = data();
+    let mut text = String::from("x y z\n");
+    for i in 0..400 {
+        writeln!(
+            text,
+            "{} {} {}",
+            f64::from(i % 20) / 10.0 - 1.0,
+            f64::from(i / 20) / 10.0 - 1.0,
+            2.0 + 0.01 * f64::from(i % 7)
+        )
+        .unwrap();
+    }
+    place.write("frame.xyz", text);
+    let out =
+        place.expect(0, &["init", "frame.xyz", "-o", "frame.toml"], "-y does, as its points lie before a depth camera");
+    let text = String::from_utf8(place.bytes("frame.toml")).unwrap();
+    assert!(text.contains("transform = { up = \"-y\" }"), "{text}{out:?}");
+}

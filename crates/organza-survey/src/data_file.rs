@@ -5,7 +5,8 @@ use crate::preset::Wish;
 use crate::stands::{cloud_stands_along, extent, lies_before_camera, lies_flat_along, stands_along};
 use organza::{Context, Error, SourceData, printable, scene};
 use read::{ReadParams, stated_up_axis};
-use splat_core::UpAxis;
+use splat_core::{Mesh, UpAxis};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A data file that was read.
@@ -29,6 +30,45 @@ pub struct DataFile {
     pub array_error: Option<Error>,
     /// The value of a volume outside of the cells that it was sampled from; `None` where its voxels are those of the file.
     pub value_outside: Option<f64>,
+    /// The column of a mesh that was asked for, or that its file shows.
+    pub column: Option<ShownColumn>,
+    /// All columns that a mesh may be coloured by.
+    pub columns: Vec<String>,
+}
+
+/// The column of a mesh that a first scene may colour it by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownColumn {
+    /// Its name, as `color_by` takes it.
+    pub name: String,
+    /// Its least and its greatest finite number.
+    pub range: [f64; 2],
+    /// How many numbers it has, if these are few whole ones from 0 on.
+    pub labels: Option<usize>,
+}
+
+impl ShownColumn {
+    /// That of a mesh; `None` where it has none of that name, or no finite number.
+    fn of_mesh(mesh: &Mesh, name: &str) -> Option<Self> {
+        /// Numbers up to which whole ones may be labels.
+        const MOST_LABELS: usize = 256;
+        let column = mesh.columns.iter().find(|column| column.name == name)?;
+        let numbers = || column.values.iter().copied().filter(|number| number.is_finite());
+        let range = [numbers().fold(f64::INFINITY, f64::min), numbers().fold(f64::NEG_INFINITY, f64::max)];
+        let is_label = |number: f64| number >= -1.0 && number.fract() == 0.0;
+        let mut known = BTreeSet::new();
+        let are_few = numbers().all(|number| {
+            known.insert(number as i64);
+            is_label(number) && known.len() <= MOST_LABELS
+        });
+        let labels = (are_few && known.len() > 1).then_some(known.len());
+        (range[0] <= range[1]).then(|| Self { name: name.to_owned(), range, labels })
+    }
+
+    /// Whether all its numbers are one.
+    pub(crate) fn is_constant(&self) -> bool {
+        self.range[0] == self.range[1]
+    }
 }
 
 impl DataFile {
@@ -39,7 +79,23 @@ impl DataFile {
     pub fn read(path: &Path, wish: &Wish, context: Context<'_>) -> Result<Self, Error> {
         let Context { files, options, progress } = context;
         let columns = wish.color_by.iter().cloned().collect();
-        let mut data = files.read(path, &ReadParams { columns, ..options.read_params() }, progress)?;
+        let params = ReadParams { columns, surfaces: !wish.shows_inside(), ..options.read_params() };
+        let mut data = files.read(path, &params, progress)?;
+        let mut column = None;
+        if let SourceData::Mesh(mesh) = &data
+            && let Some(name) = wish.color_by.clone().or_else(|| files.shown_column(path))
+        {
+            let mesh = if mesh.columns.iter().any(|column| column.name == name) {
+                mesh.clone()
+            } else {
+                match files.read(path, &ReadParams { columns: vec![name.clone()], ..params.clone() }, progress)? {
+                    SourceData::Mesh(with_column) => with_column,
+                    _ => mesh.clone(),
+                }
+            };
+            column = ShownColumn::of_mesh(&mesh, &name);
+            data = SourceData::Mesh(mesh);
+        }
         let mut array = None;
         let mut array_error = None;
         if let (SourceData::Grid(_), Some(name)) = (&data, &wish.color_by) {
@@ -55,7 +111,8 @@ impl DataFile {
         }
         let stated_up = stated_up_axis(path);
         let value_outside = files.value_outside(path);
-        Ok(Self { array, array_error, value_outside, ..Self::of_data(path, data, stated_up, wish)? })
+        let columns = files.named_columns(path);
+        Ok(Self { array, array_error, value_outside, column, columns, ..Self::of_data(path, data, stated_up, wish)? })
     }
 
     /// Data that a program has in memory under this name, and the axis of it that points up, where that is known; of points all columns are there.
@@ -78,7 +135,7 @@ impl DataFile {
         let refuse = |message: &str, hint: &str| Err(Error::input(printable(path), message, hint));
         match &data {
             SourceData::Mesh(mesh) | SourceData::Painted(mesh, _) if mesh.triangles.is_empty() => {
-                refuse("expected at least one face, found none", "")
+                refuse("expected at least one face or line, found none", "save its surface as triangles")
             }
             SourceData::Points(points) if points.is_empty() => refuse("expected at least one point, found none", ""),
             SourceData::Grid(grid) if grid.values.iter().all(|value| value.is_nan()) => {
@@ -113,6 +170,8 @@ impl DataFile {
                     nodata,
                     array_error: None,
                     value_outside: None,
+                    column: None,
+                    columns: Vec::new(),
                 })
             }
         }
@@ -191,6 +250,8 @@ mod tests {
                 nodata: None,
                 array_error: None,
                 value_outside: None,
+                column: None,
+                columns: Vec::new(),
             }
         };
         let black = file(vec![[0.0; 3]; 3]);
@@ -241,6 +302,8 @@ mod tests {
                 nodata: None,
                 array_error: None,
                 value_outside: None,
+                column: None,
+                columns: Vec::new(),
             }
             .name()
         };

@@ -129,6 +129,7 @@ pub fn first_scene(
         remarks: up_remarks(data, wish)
             .chain(degree_remarks(data))
             .chain(label_remarks(data, &objects))
+            .chain(column_remarks(data, wish))
             .chain(material_remarks(data, wish))
             .collect(),
     })
@@ -160,7 +161,10 @@ fn check_labels(data: &[DataFile], wish: &Wish) -> Result<(), Error> {
         None => return Ok(()),
     };
     let reason = |file: &DataFile| {
-        let SourceData::Grid(grid) = &file.data else { return None };
+        let SourceData::Grid(grid) = &file.data else {
+            let column = file.column.as_ref()?;
+            return Some(format!("; {}: `{}` has other numbers, or too many", printable(&file.path), column.name));
+        };
         let reason = look::stated_labels(grid, wish)?.err().unwrap_or_else(|| look::AS_IT_IS.to_owned());
         Some(format!("; {}: {reason}", printable(&file.path)))
     };
@@ -182,6 +186,39 @@ fn label_remarks<'a>(data: &'a [DataFile], objects: &'a [Object]) -> impl Iterat
         }
         let labels = counted(object.labels()? as u64, "label");
         Some(format!("{path}: whole numbers that look like {labels}: each region has its surface and its colour; --preset mri draws amounts"))
+    })
+}
+
+/// Reports which column of a file a mesh has its colours from without having been asked for, and which ones it could have them from.
+fn column_remarks<'a>(data: &'a [DataFile], wish: &'a Wish) -> impl Iterator<Item = String> + 'a {
+    /// Columns that are named.
+    const NAMED: usize = 12;
+    let is_free = |file: &&DataFile| wish.color_by.is_none() && wish.material.is_none() && !file.is_colored();
+    let is_mesh = |file: &&DataFile| matches!(file.data, SourceData::Mesh(_)) && !file.columns.is_empty();
+    data.iter().filter(is_free).filter(is_mesh).map(|file| {
+        let shown = file.column.as_ref();
+        let others = file.columns.iter().filter(|name| shown.is_none_or(|shown| shown.name != **name));
+        let others: Vec<&str> = others.map(String::as_str).collect();
+        let further = others.len().saturating_sub(NAMED);
+        let mut list = others[..others.len().min(NAMED)].join(", ");
+        if further > 0 {
+            let _ = write!(list, " and {further} more");
+        }
+        let choose = match others.len() {
+            0 => String::new(),
+            _ => format!("; --color-by chooses another column: {list}"),
+        };
+        let path = printable(&file.path);
+        match shown {
+            Some(shown) if shown.is_constant() => {
+                format!(
+                    "{path}: `{}` is {} throughout, so the surface has one colour{choose}",
+                    shown.name, shown.range[0]
+                )
+            }
+            Some(shown) => format!("{path}: its colours are those of `{}`{choose}", shown.name),
+            None => format!("{path}: it has no colours of its own; --color-by colours it by a column: {list}"),
+        }
     })
 }
 
@@ -325,6 +362,8 @@ mod tests {
                 nodata: None,
                 array_error: None,
                 value_outside: None,
+                column: None,
+                columns: Vec::new(),
             }
         };
         let text = |files: &[DataFile]| render_text(files, &Wish::default(), false);

@@ -23,7 +23,7 @@ mod spacing;
 mod stands;
 mod transfer;
 
-pub use data_file::DataFile;
+pub use data_file::{DataFile, ShownColumn};
 pub use facts::{Facts, LabelFact, facts};
 pub use first_scene::{Written, first_scene, ground_of};
 pub use histogram::Histogram;

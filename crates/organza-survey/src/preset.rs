@@ -145,6 +145,17 @@ pub struct Wish {
     pub ground: bool,
 }
 
+impl Wish {
+    /// Whether cells are wanted as a volume and not as the surface around them: by a look of volumes, a table of labels, or a material of media.
+    pub(crate) fn shows_inside(&self) -> bool {
+        let is_look = |preset: &Preset| preset.map().is_none() && !preset.is_labels();
+        let is_of_media = |material: &&Recipe| !material.is_of_surfaces();
+        self.preset.as_ref().is_some_and(is_look)
+            || self.labels.is_some()
+            || self.material.as_ref().is_some_and(is_of_media)
+    }
+}
+
 impl Default for Wish {
     fn default() -> Self {
         Self {

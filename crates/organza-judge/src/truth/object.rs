@@ -236,7 +236,10 @@ pub(super) fn read(
     array: Option<&String>,
     options: &RenderOptions,
 ) -> Result<FileData, Error> {
-    let params = ReadParams { frame, array: array.cloned(), textures: Textures::Divided, ..options.read_params() };
+    let is_mesh = |object: &SceneObject| matches!(&object.source, Source::Mesh(mesh) if mesh == path);
+    let surfaces = scene.objects.iter().any(is_mesh);
+    let array = array.cloned();
+    let params = ReadParams { frame, array, surfaces, textures: Textures::Divided, ..options.read_params() };
     match scene.in_memory.get(path) {
         Some(SourceData::Mesh(mesh)) => {
             let turned = read::mesh_in_memory(&printable(path), Mesh::clone(mesh), &params);

@@ -133,7 +133,7 @@ pub(super) fn objects(data: &[DataFile], paths: &[String], table: Option<&str>, 
             // A material by name shows no column unless that is asked for too.
             SourceData::Points(_) if wish.material.is_some() && wish.color_by.is_none() => None,
             SourceData::Points(points) => point_colors(points, file.has_colors(), wish),
-            SourceData::Mesh(_) | SourceData::Painted(..) => mesh_colors(wish),
+            SourceData::Mesh(_) | SourceData::Painted(..) => mesh_colors(file, wish),
             SourceData::Grid(_) | SourceData::Image(_) => None,
         };
         let is_bare = !file.is_colored() && colors.is_none() && wish.material.is_none();
@@ -189,7 +189,10 @@ pub(super) fn takes_preset(file: &DataFile, wish: &Wish) -> bool {
     match &file.data {
         SourceData::Grid(_) => true,
         SourceData::Points(points) => is_map && point_colors(points, file.has_colors(), wish).is_some(),
-        SourceData::Mesh(_) | SourceData::Painted(..) => is_map && wish.color_by.is_some(),
+        SourceData::Mesh(_) | SourceData::Painted(..) if wish.preset.as_ref().is_some_and(Preset::is_labels) => {
+            file.column.as_ref().is_some_and(|column| column.labels.is_some())
+        }
+        SourceData::Mesh(_) | SourceData::Painted(..) => is_map && mesh_colors(file, wish).is_some(),
         SourceData::Image(_) => false,
     }
 }
@@ -290,7 +293,14 @@ fn object(file: &DataFile, wish: &Wish, table: Option<&str>, colors: Option<Stri
                 grouped(mesh.position.len() as u64),
                 sides(mesh.bounds())
             );
-            bare("mesh", about, clay, colors.unwrap_or_default())
+            let labels = file.column.as_ref().and_then(|column| column.labels);
+            let are_labels = preset.is_some_and(Preset::is_labels);
+            let doubt = labels.filter(|_| !are_labels && colors.is_some()).map(|labels| {
+                let numbers = counted(labels as u64, "whole number");
+                format!("its {numbers} are taken for amounts, not for labels; --preset labels gives each a colour of its own")
+            });
+            let labels = labels.filter(|_| are_labels);
+            Object { labels, doubt, ..bare("mesh", about, clay, colors.unwrap_or_default()) }
         }
         SourceData::Points(points) => {
             let positions = points.position.iter().map(|p| points.origin + p.as_dvec3());

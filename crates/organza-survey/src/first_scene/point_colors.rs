@@ -1,6 +1,7 @@
 //! Which column points or a mesh take their colours from in a first scene, and in which colours.
 
 use super::quoted;
+use crate::data_file::DataFile;
 use crate::number::grouped;
 use crate::preset::{Preset, Wish};
 use convert::class_name;
@@ -29,16 +30,21 @@ pub(super) fn point_colors(points: &RawPoints, are_colored: bool, wish: &Wish) -
     Some(text)
 }
 
-/// The keys of the colours of a mesh, where they are asked for.
-pub(super) fn mesh_colors(wish: &Wish) -> Option<String> {
-    let chosen = wish.color_by.as_ref()?;
+/// The keys of the colours of a mesh: of the column that is asked for, else of the one that its file shows, unless that has one value.
+pub(super) fn mesh_colors(file: &DataFile, wish: &Wish) -> Option<String> {
+    let is_free = wish.material.is_none() && !file.is_colored();
+    let shown = file.column.as_ref().filter(|column| is_free && !column.is_constant());
+    let chosen = wish.color_by.as_ref().or(shown.map(|column| &column.name))?;
     let about = "# Colours by a column; `organza info` lists the columns of the file.\n";
     Some(format!("{about}{}", color_by(chosen, wish)))
 }
 
 /// The line that names a column.
 fn color_by(column: &str, wish: &Wish) -> String {
-    let map = wish.preset.as_ref().and_then(Preset::map).map(|map| format!(", map = \"{}\"", map.name()));
+    let preset = wish.preset.as_ref();
+    let name = preset.and_then(Preset::map).map(|map| map.name());
+    let name = name.or(preset.filter(|preset| preset.is_labels()).map(|_| "distinct"));
+    let map = name.map(|name| format!(", map = \"{name}\""));
     let range = wish.color_range.map(|[low, high]| format!(", range = [{low:?}, {high:?}]"));
     let scale = if wish.is_logarithmic { ", scale = \"log\"" } else { "" };
     let keys = [map.unwrap_or_default(), range.unwrap_or_default()].concat();

@@ -158,6 +158,21 @@ impl Files {
         of_first_frame.and_then(|(_, (_, notes, _))| notes.value_outside)
     }
 
+    /// The column of a mesh that its file shows, see [`read::Notes::shown_column`]; `None` of what was not read.
+    pub fn shown_column(&self, path: &Path) -> Option<String> {
+        let read = self.read.borrow();
+        let of_first_frame = read.get(&(real(path), 0));
+        of_first_frame.and_then(|(_, (_, notes, _))| notes.shown_column.clone())
+    }
+
+    /// The names of the columns that a file has and that have no meaning of their own; none of what was not read.
+    pub fn named_columns(&self, path: &Path) -> Vec<String> {
+        let read = self.read.borrow();
+        let of_first_frame = read.get(&(real(path), 0));
+        let names = |notes: &Notes| notes.columns.iter().map(|column| column.name.clone()).collect();
+        of_first_frame.map(|(_, (_, notes, _))| names(notes)).unwrap_or_default()
+    }
+
     /// The same without keeping a file: for whoever keeps what is made from it.
     pub(super) fn data_once(
         &self,

@@ -1,7 +1,7 @@
 //! The facts of the scene that reading and converting an object need.
 
 use super::files::Files;
-use crate::scene::{Scene, SceneObject, SourceData};
+use crate::scene::{Scene, SceneObject, Source, SourceData};
 use crate::{Error, RenderOptions};
 use convert::{Orientation, SplatParams, SurfelParams, VolumeParams};
 use glam::DVec3;
@@ -107,7 +107,8 @@ impl ObjectContext<'_> {
         // A surface with a field takes the size of the field's voxels.
         let voxel_size =
             self.object_read(path).filter(|object| object.field.is_none()).and_then(|object| object.voxel_size);
-        let params = ReadParams { columns, matter, most_points, voxel_size, ..self.options.read_params() };
+        let surfaces = self.object_read(path).is_some_and(|object| matches!(object.source, Source::Mesh(_)));
+        let params = ReadParams { columns, matter, most_points, voxel_size, surfaces, ..self.options.read_params() };
         self.files.data(self.scene, path, &params, self.progress)
     }
 
