@@ -232,6 +232,7 @@ fn named(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::preset::Preset;
     use organza::{Files, Progress, RenderOptions};
     use splat_core::glam::{DMat3, DVec3};
     use splat_core::{Grid, RawPoints};
@@ -277,7 +278,9 @@ mod tests {
             std::fs::write(&path, content).expect("a file");
             let context =
                 Context { files: &Files::default(), options: &RenderOptions::default(), progress: &Progress::new() };
-            DataFile::read(&path, &Wish::default(), context).expect("a volume").value_outside
+            // Cells are sampled for what is inside of them.
+            let wish = Wish { preset: Some(Preset::named("mri").expect("a look")), ..Wish::default() };
+            DataFile::read(&path, &wish, context).expect("a volume").value_outside
         };
         let head = "# vtk DataFile Version 3.0\na\nASCII\nDATASET";
         let cells =

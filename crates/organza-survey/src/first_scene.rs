@@ -71,6 +71,9 @@ pub fn first_scene(
     let root = root_for(scene_file, on_disk.chain(tables))?;
     let root = root.map(|root| text_of(&root)).transpose()?;
     if wish.preset.is_some() && !data.iter().any(|file| takes_preset(file, wish)) {
+        if wish.preset.as_ref().is_some_and(Preset::is_labels) {
+            check_labels(data, wish)?;
+        }
         let is_look = wish.color_by.is_some() && wish.preset.as_ref().and_then(Preset::map).is_none();
         if is_look {
             let names: Vec<&str> = ColorMap::names().collect();

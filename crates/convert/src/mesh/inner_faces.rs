@@ -81,7 +81,7 @@ mod tests {
         // Two tetrahedra with vertices of their own and a common face.
         let doubled: Vec<Vec3> = position.iter().chain(&position).copied().collect();
         let upper = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-        let lower = [[6, 5, 7], [5, 9, 6], [6, 9, 7], [7, 9, 5]];
+        let lower = [[5, 6, 7], [5, 9, 6], [6, 9, 7], [7, 9, 5]];
         let triangles: Vec<[u32; 3]> = upper.into_iter().chain(lower).collect();
         let column = MeshColumn {
             name: "rank".into(),

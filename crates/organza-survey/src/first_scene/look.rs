@@ -498,7 +498,7 @@ mod tests {
         // A brain without its skull has no bones: they would be nothing in a dark film.
         let brain = ball(|r| if r < 20.0 { 22.0 + (r * 7919.0) % 64.0 } else { -1024.0 });
         let with_a_clot =
-            Grid { values: brain.values.iter().map(|v| if *v > 85.9 { 172.0 } else { *v }).collect(), ..brain };
+            Grid { values: brain.values.iter().map(|v| if *v > 73.0 { 172.0 } else { *v }).collect(), ..brain };
         let matter = Matter::from_grid(&with_a_clot).expect("matter");
         assert!(matter.has_units() && !matter.has_bones(), "{matter:?}");
         assert_eq!(look(&with_a_clot, None, true), None);
