@@ -42,7 +42,6 @@ pub use field_points::{
     surface_to_mesh, surface_to_points,
 };
 pub use mesh::clipped_mesh::clipped_mesh;
-pub use mesh::inner_faces::without_inner_faces;
 #[cfg(feature = "lids")]
 pub use mesh::lid::{LidReport, LiddedMesh, lidded_mesh};
 pub use mesh::mesh_points::{

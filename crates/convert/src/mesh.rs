@@ -2,7 +2,6 @@
 
 pub(crate) mod borders;
 pub(crate) mod clipped_mesh;
-pub(crate) mod inner_faces;
 #[cfg(feature = "lids")]
 pub(crate) mod lid;
 pub(crate) mod mesh_points;

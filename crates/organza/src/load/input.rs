@@ -257,9 +257,6 @@ fn own_mesh(
     context.files.warn(path, report.said());
     let has_others = object.color.is_some() && !mesh.color.is_empty();
     let mesh = if has_others { Mesh { color: Vec::new(), ..Mesh::clone(&mesh) }.into() } else { mesh };
-    let is_opaque = params.opacity >= 1.0 && mesh.opacity.is_empty() && !params.splat.keep_clear;
-    let outside = if is_opaque && painting.is_none() { convert::without_inner_faces(&mesh) } else { None };
-    let mesh = outside.map_or(mesh, Arc::new);
     Ok(ShownMesh { mesh, painting })
 }
 
