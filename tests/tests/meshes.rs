@@ -1,7 +1,7 @@
 //! Meshes as they are found: one bad face among many, surfaces turned inside out.
 
 use glam::{DVec3, Vec3};
-use organza_tests::{Picture, Place, SMALL_SCENE, draw_in, largest_difference};
+use organza_tests::{Picture, Place, SMALL_SCENE, draw_in, largest_difference, picture_of};
 use read::{Loaded, ReadParams};
 use splat_core::Mesh;
 use std::path::Path;
@@ -18,6 +18,16 @@ fn scene(mesh: &str, center: DVec3, radius: f64, material: &str) -> String {
         z + 2.4 * radius,
         radius / 40.0
     )
+}
+
+#[test]
+fn a_sheet_with_faces_for_both_sides_is_drawn() {
+    let place = Place::new("");
+    place.write("sheet.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 3 2 1\nf 4 3 1\n");
+    let front = ["--azimuth", "0", "--elevation", "0", "--size", "40x40", "-o", "a.exr"];
+    place.expect(0, &[&["render", "sheet.obj"][..], &front].concat(), "");
+    let opacity = picture_of(&place.path("a.exr")).opacity();
+    assert!(opacity[20 * 40 + 20] > 0.99, "{}", opacity[20 * 40 + 20]);
 }
 
 /// A mesh as an ascii PLY file, with its normals if it has some.

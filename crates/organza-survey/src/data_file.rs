@@ -43,12 +43,12 @@ pub struct ShownColumn {
     pub name: String,
     /// Its least and its greatest finite number.
     pub range: [f64; 2],
-    /// How many numbers it has, if these are few whole ones from 0 on.
+    /// How many numbers it has, if these are few whole ones from −1 on, which often stands for none.
     pub labels: Option<usize>,
 }
 
 impl ShownColumn {
-    /// That of a mesh; `None` where it has none of that name, or no finite number.
+    /// A column of a mesh by its name; `None` where the mesh has no such column, and where that has no finite number.
     fn of_mesh(mesh: &Mesh, name: &str) -> Option<Self> {
         /// Numbers up to which whole ones may be labels.
         const MOST_LABELS: usize = 256;

@@ -288,7 +288,7 @@ impl Event {
         document["do"].as_str().unwrap_or_default().to_owned()
     }
 
-    /// What it changes: its name in files and the names in it.
+    /// What it changes: the kind of the event with the object, the light or the effect that it names. Events with one subject may be one step.
     pub(crate) fn subject(&self) -> String {
         let document = serde_json::to_value(self).unwrap_or_default();
         let name = |key: &str| document[key].as_str().unwrap_or_default();

@@ -38,7 +38,6 @@ mod curve;
 mod depths;
 mod desk;
 mod event;
-mod history;
 mod layer_image;
 mod lights;
 mod picture;

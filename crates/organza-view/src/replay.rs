@@ -1,9 +1,8 @@
 //! Files of events, and the state behind them.
 
 use crate::event::Event;
-use crate::history::History;
 use crate::recording::MOST_EVENTS;
-use crate::state::{Source, State};
+use crate::state::{History, Source, State};
 use crate::viewpoint::Viewpoint;
 use crate::wording;
 use organza::scene::Scene;

@@ -1,5 +1,9 @@
 //! A person's changes to a scene, and the scene that follows from them.
 
+mod history;
+
+pub(crate) use history::History;
+
 use crate::event::{Cut, Event, Knot, Switch, settings};
 use crate::lights::{Aim, Direction, LightChange};
 use crate::picture::Size;

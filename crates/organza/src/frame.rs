@@ -83,7 +83,7 @@ pub(crate) struct Leaves {
 }
 
 impl Leaves {
-    /// What it leaves for a frame in which lights are brighter or darker: their shadow maps, if these are planned alike.
+    /// What serves a frame of the same splats whose lights are brighter or darker: shadow maps. Which splats are drawn may be another choice there.
     pub(crate) fn of_lights(self) -> Self {
         Self { maps: self.maps, shaded: self.shaded, lists: Lists::default() }
     }

@@ -32,8 +32,9 @@ struct MadeAs {
     tables: Vec<Option<(tsm::Prediction, f32)>>,
     /// [`Plan::casters`].
     casters: Vec<Vec<bool>>,
-    /// Who draws each object, from its own data or as splats: light is remembered of splats that are drawn.
-    drawn: (Vec<Technique>, Vec<bool>),
+    /// [`Plan::by`] and [`Plan::is_own`], which decide of which splats light is remembered.
+    by: Vec<Technique>,
+    is_own: Vec<bool>,
 }
 
 impl Maps {
@@ -48,7 +49,8 @@ impl Maps {
         let is_there = |made: &MadeAs| made.tables.iter().map(Option::is_some).collect::<Vec<_>>();
         is_there(&self.made_as) == is_there(&other)
             && self.made_as.casters == other.casters
-            && self.made_as.drawn == other.drawn
+            && self.made_as.by == other.by
+            && self.made_as.is_own == other.is_own
     }
 
     /// The limit that the cells of each map ended at.
@@ -59,7 +61,7 @@ impl Maps {
     fn made_as(plan: &Plan) -> MadeAs {
         let tables = plan.shadow_tables.iter().chain(&plan.other_tables);
         let tables = tables.map(|table| table.map(|table| (table.predicted, table.tolerance))).collect();
-        MadeAs { tables, casters: plan.casters.clone(), drawn: (plan.by.clone(), plan.is_own.clone()) }
+        MadeAs { tables, casters: plan.casters.clone(), by: plan.by.clone(), is_own: plan.is_own.clone() }
     }
 }
 

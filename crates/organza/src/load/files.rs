@@ -27,7 +27,7 @@ pub(super) struct Blocks {
     pub(super) _held: Arc<Reservation>,
 }
 
-/// What such a volume is made of.
+/// The volume and the choices that [`Blocks`] are made of.
 #[derive(Clone)]
 struct MadeOfGrid {
     whole: Weak<Grid>,
@@ -61,8 +61,10 @@ pub struct Files {
     pub(crate) seen: Made<(ExtractSource, Scene), Arc<RawPoints>>,
     /// Volumes of which blocks are taken as one voxel, beside what they were made of.
     blocks: RefCell<Vec<(MadeOfGrid, Blocks)>>,
-    /// What was converted for the last preview; `None` where there are no previews.
-    converted: RefCell<Option<Option<Converted>>>,
+    /// Whether they are read for previews, each of which converts what has changed since the one before.
+    are_for_previews: Cell<bool>,
+    /// Splats of the last preview.
+    converted: RefCell<Option<Arc<Converted>>>,
     /// Most bytes that parts of the scene took while lights looked at them.
     pub(crate) most: Cell<u64>,
     /// Repairs of the files, and warnings about them.
@@ -84,6 +86,7 @@ impl Default for Files {
             stopped: RefCell::default(),
             seen: RefCell::default(),
             blocks: RefCell::default(),
+            are_for_previews: Cell::default(),
             converted: RefCell::default(),
             most: Cell::default(),
             mended: RefCell::default(),
@@ -313,10 +316,11 @@ impl Files {
         make: impl FnOnce() -> Result<Blocks, Error>,
     ) -> Result<Arc<Grid>, Error> {
         let nodata = nodata.map(f32::to_bits);
-        self.blocks.borrow_mut().retain(|(of, _)| of.whole.strong_count() > 0);
-        let is_same =
-            |of: &MadeOfGrid| of.whole.as_ptr() == Arc::as_ptr(whole) && of.nodata == nodata && of.block == block;
-        if let Some((_, known)) = self.blocks.borrow().iter().find(|(of, _)| is_same(of)) {
+        self.blocks.borrow_mut().retain(|(made_of, _)| made_of.whole.strong_count() > 0);
+        let is_same = |made: &MadeOfGrid| {
+            made.whole.as_ptr() == Arc::as_ptr(whole) && made.nodata == nodata && made.block == block
+        };
+        if let Some((_, known)) = self.blocks.borrow().iter().find(|(made_of, _)| is_same(made_of)) {
             return Ok(known.grid.clone());
         }
         let made = make()?;
@@ -326,24 +330,20 @@ impl Files {
 
     /// The same files for previews or not; nothing is converted for previews yet.
     pub(crate) fn for_previews(self, are_previews: bool) -> Self {
-        self.converted.replace(are_previews.then_some(None));
+        self.are_for_previews.set(are_previews);
+        self.converted.take();
         self
     }
 
-    /// Whether they are read for previews.
-    pub(super) fn are_for_previews(&self) -> bool {
-        self.converted.borrow().is_some()
+    /// Takes the splats of the last preview.
+    pub(super) fn take_converted(&self) -> Option<Arc<Converted>> {
+        self.converted.take()
     }
 
-    /// Takes what was converted for the last preview.
-    pub(super) fn take_converted(&self) -> Option<Converted> {
-        self.converted.borrow_mut().as_mut().and_then(Option::take)
-    }
-
-    /// Keeps what was converted for a preview.
+    /// Keeps the splats of a preview, where there are previews.
     pub(super) fn keep_converted(&self, converted: impl FnOnce() -> Converted) {
-        if let Some(kept) = &mut *self.converted.borrow_mut() {
-            *kept = Some(converted());
+        if self.are_for_previews.get() {
+            self.converted.replace(Some(converted().into()));
         }
     }
 
@@ -354,7 +354,7 @@ impl Files {
 
     /// None any more, on the same account.
     pub(crate) fn emptied(&self) -> Self {
-        Self { memory: self.memory.clone(), ..Self::default() }.for_previews(self.are_for_previews())
+        Self { memory: self.memory.clone(), ..Self::default() }.for_previews(self.are_for_previews.get())
     }
 
     /// Most bytes that files and images took at a time, while they were read too.
@@ -367,7 +367,7 @@ impl Files {
         let read: u64 = self.read.borrow().values().map(|(_, read)| read.0.bytes()).sum();
         let seen: u64 = self.seen.borrow().iter().map(|(_, points)| points.bytes()).sum();
         let blocks: u64 = self.blocks.borrow().iter().map(|(_, made)| made.grid.bytes()).sum();
-        let converted = self.converted.borrow().iter().flatten().map(|converted| converted.cloud.bytes()).sum::<u64>();
+        let converted = self.converted.borrow().as_ref().map_or(0, |converted| converted.cloud.bytes());
         read + seen + blocks + converted + self.fitted.borrow().iter().map(|(_, (_, bytes))| bytes).sum::<u64>()
     }
 }

@@ -5,8 +5,7 @@ use crate::scene::{Scene, Source};
 use convert::DiscSize;
 use splat_core::Cloud;
 
-/// What was converted for a preview.
-#[derive(Clone)]
+/// The splats of a preview, and the scene and the choices that they were converted by.
 pub(super) struct Converted {
     pub(super) scene: Scene,
     /// By the rank of the object; `None` for one that was not converted.
@@ -23,7 +22,7 @@ impl Converted {
         let object = scene.objects.get(rank)?;
         let is_same = self.scene.objects.get(rank) == Some(object) && self.planned.get(rank)?.as_ref() == Some(planned);
         let by_pixels = matches!(object.points.size, Some(DiscSize::Pixels(_)));
-        // What a light sees follows from all that is lit.
+        // Points that a light sees depend on all other objects.
         let is_of_others = matches!(object.source, Source::Extract(_));
         if !is_same || by_pixels || is_of_others || !self.serves(scene) {
             return None;

@@ -251,11 +251,11 @@ mod tests {
         }
     }
 
+    /// Each state follows the one before it.
     #[test]
     fn shadow_maps_serve_lights_that_are_brighter_with_the_same_bits() {
         let options = RenderOptions::default();
         let progress = Progress::new();
-        // Each follows the one before it. Maps are planned by what light shows, in previews for all views.
         let states: [(&[&str], bool); 6] = [
             (&[], false),
             (&["light.sun.irradiance=[0.8, 0.9, 1]"], true),

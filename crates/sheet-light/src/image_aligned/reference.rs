@@ -240,7 +240,7 @@ impl Sheets {
         (extinction / self.weights[sheet], colors.map(|c| (c / extinction.max(f64::MIN_POSITIVE)) as f32))
     }
 
-    /// What lies between two depths in a slab: its halves, the front attenuating the back. `factor` makes an optical depth of an extinction over a unit of depth.
+    /// The medium between two depths of a slab, whose front half hides its back half. `factor` makes an optical depth of an extinction over a unit of depth.
     fn integrated(&self, volume: &Volume<'_>, slab: u32, pixel: usize, depths: [f64; 2], factor: f64) -> Part {
         let [near, far] = depths;
         let center = (f64::from(slab) + 0.5) * self.slabs.width;
@@ -309,7 +309,7 @@ impl Sheets {
         let (class, color) = if params.classify == Classify::Preintegrated {
             let factor = volume.extinction_scale * f64::from(volume.material.extinction_rgb[1]) * along.length();
             let part = self.integrated(volume, own_slab, pixel, [near, far], factor);
-            // What is lit is lit once for the whole of the volume's own slab.
+            // Light is looked up once for a slab of the volume, also where limits cut it into parts.
             let lit = if volume.material.shading == Shading::Unlit { [near, far] } else { [begin, end] };
             let lit = self.integrated(volume, own_slab, pixel, lit, factor);
             middle = lit.middle;

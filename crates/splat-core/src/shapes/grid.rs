@@ -230,4 +230,22 @@ mod tests {
         let odd = Grid { dims: [5, 10, 5], ..bcc.planes };
         assert!(matches!(BccGrid { planes: odd }.validate(), Err(Error::Invalid { .. })));
     }
+
+    #[test]
+    fn blocks_have_the_means_of_their_known_points_at_their_middles() {
+        // A ramp of the place along i, a sheared lattice, and a column without values; 5 points end in a block of one.
+        let dims = [5, 4, 3];
+        let value = |rank: usize| if rank % 20 < 5 && rank % 5 == 1 { f32::NAN } else { (rank % 5) as f32 };
+        let axes = DMat3::from_cols(DVec3::new(2.0, 0.5, 0.0), DVec3::Y, DVec3::Z);
+        let grid = Grid { origin: DVec3::X, axes, dims, values: (0..60).map(value).collect() };
+        let coarse = grid.coarsened(2, 2);
+        // Along k a block of two would leave one block and a half.
+        assert_eq!(coarse.dims, [3, 2, 3]);
+        assert_eq!(coarse.position(0, 0, 0), grid.origin + grid.axes * DVec3::new(0.5, 0.5, 0.0));
+        let row = |j: usize| &coarse.values[3 * j..3 * j + 3];
+        assert_eq!((row(0), row(1)), (&[1.0 / 3.0, 2.5, 4.0][..], &[0.5, 2.5, 4.0][..]));
+        assert_eq!(grid.coarsened(1, 1).dims, dims);
+        let none = Grid { values: vec![f32::NAN; 60], ..grid };
+        assert!(none.coarsened(9, 1).values.iter().all(|value| value.is_nan()));
+    }
 }

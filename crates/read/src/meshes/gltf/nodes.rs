@@ -56,24 +56,24 @@ pub(super) fn with_copies<'a>(
     buffers: &Buffers<'_>,
     reading: &mut Reading<'_>,
 ) -> Result<Vec<Instance<'a>>, ReadError> {
-    let mut all = Vec::new();
+    let mut found = Vec::new();
     for instance in instances {
         let Some(copies) = &instance.node.extensions.copies else {
-            all.push(instance);
+            found.push(instance);
             continue;
         };
         let places = node_from_copies(copies, buffers, reading)?;
-        input::hold("the copies of a mesh", (all.len() + places.len()) as u64 * BYTES_PER_COPY, reading.params)?;
-        input::reserve(&mut all, places.len())?;
+        input::hold("the copies of a mesh", (found.len() + places.len()) as u64 * BYTES_PER_COPY, reading.params)?;
+        input::reserve(&mut found, places.len())?;
         let scene_from_node = instance.scene_from_mesh;
         let copy = |node_from_copy: &DMat4| Instance { scene_from_mesh: scene_from_node * *node_from_copy, ..instance };
-        all.extend(places.iter().map(copy));
+        found.extend(places.iter().map(copy));
     }
-    Ok(all)
+    Ok(found)
 }
 
-/// Bytes that the place of a copy takes, with its attributes.
-const BYTES_PER_COPY: u64 = (size_of::<Instance<'_>>() + size_of::<DMat4>()) as u64 + 40;
+/// Bytes that the place of a copy takes, with its attributes: a shift, a turn and a scale.
+const BYTES_PER_COPY: u64 = (size_of::<Instance<'_>>() + size_of::<DMat4>() + (3 + 4 + 3) * size_of::<f32>()) as u64;
 
 /// The transforms of the copies of a mesh: scaled, then turned, then moved.
 fn node_from_copies(
@@ -83,9 +83,8 @@ fn node_from_copies(
 ) -> Result<Vec<DMat4>, ReadError> {
     const USED: [&str; 3] = ["TRANSLATION", "ROTATION", "SCALE"];
     let unused = copies.attributes.keys().filter(|name| !USED.contains(&name.as_str()));
-    reading.notes.not_used(
-        unused.map(|name| format!("{name} of copies").into_bytes()).collect::<Vec<_>>().iter().map(Vec::as_slice),
-    );
+    let unused: Vec<String> = unused.map(|name| format!("{name} of copies")).collect();
+    reading.notes.not_used(unused.iter().map(String::as_bytes));
     let Some(count) = USED.iter().find_map(|name| copies.attributes.get(*name)).map(|index| buffers.count(*index))
     else {
         return Ok(vec![DMat4::IDENTITY]);
@@ -102,10 +101,10 @@ fn node_from_copies(
         return Err(wrong(format!("{count} entries of each attribute of copies"), other.to_string()));
     }
     let place = |i: usize| {
-        let vector = |of: &Option<Vec<[f32; 3]>>, usual: DVec3| {
-            of.as_ref().map_or(usual, |all| DVec3::from_array(all[i].map(f64::from)))
+        let vector = |attribute: &Option<Vec<[f32; 3]>>, usual: DVec3| {
+            attribute.as_ref().map_or(usual, |vectors| DVec3::from_array(vectors[i].map(f64::from)))
         };
-        let rotation = turned.as_ref().map_or(DQuat::IDENTITY, |all| DQuat::from_array(all[i].map(f64::from)));
+        let rotation = turned.as_ref().map_or(DQuat::IDENTITY, |turns| DQuat::from_array(turns[i].map(f64::from)));
         let node_from_copy = DMat4::from_scale_rotation_translation(
             vector(&scaled, DVec3::ONE),
             if rotation.length_squared() > 0.0 { rotation.normalize() } else { rotation },

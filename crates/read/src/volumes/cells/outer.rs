@@ -110,19 +110,19 @@ impl OuterFaces {
 /// The faces around the bodies, in the order of these, and behind them the cells that are faces by themselves and lie on none of a body.
 pub(super) fn faces(cells: &Cells, reading: &mut Reading<'_>) -> Result<OuterFaces, ReadError> {
     let place_of = first_at_place(&cells.points, reading)?;
-    let all = all_faces(cells, reading)?;
+    let of_bodies = faces_of_bodies(cells, reading)?;
     reading.go_on()?;
     let mut keyed: Vec<Keyed> = Vec::new();
-    input::reserve(&mut keyed, all.len())?;
-    let with_key = |rank: usize| key(all.around(rank), &place_of).map(|key| Keyed { key, rank });
-    keyed.extend((0..all.len()).filter_map(with_key));
+    input::reserve(&mut keyed, of_bodies.len())?;
+    let with_key = |rank: usize| key(of_bodies.around(rank), &place_of).map(|key| Keyed { key, rank });
+    keyed.extend((0..of_bodies.len()).filter_map(with_key));
     keyed.sort_unstable_by_key(|face| (face.key, face.rank));
     let mut outer: Vec<usize> =
         keyed.chunk_by(|a, b| a.key == b.key).filter(|same| same.len() == 1).map(|same| same[0].rank).collect();
     outer.sort_unstable();
     let mut found = OuterFaces::default();
     for rank in outer {
-        found.push_parts(all.list[rank], all.around(rank));
+        found.push_parts(of_bodies.list[rank], of_bodies.around(rank));
     }
     for (cell, (number, corners)) in cells.kinds.iter().zip(cells.lists.iter()).enumerate() {
         let Some(kind) = Kind::of_cell(*number, corners.len()) else { continue };
@@ -139,14 +139,14 @@ pub(super) fn faces(cells: &Cells, reading: &mut Reading<'_>) -> Result<OuterFac
 }
 
 /// The faces of all bodies, those that two of them share twice.
-fn all_faces(cells: &Cells, reading: &Reading<'_>) -> Result<OuterFaces, ReadError> {
-    let mut all = OuterFaces::default();
+fn faces_of_bodies(cells: &Cells, reading: &Reading<'_>) -> Result<OuterFaces, ReadError> {
+    let mut of_bodies = OuterFaces::default();
     for body in cells.bodies() {
         let cell = body.cell as u32;
         let point = |rank: &u8| body.corners[usize::from(*rank)];
         match &body.faces {
             Faces::Of(solid) if solid.faces.is_empty() => {
-                OF_TETRAHEDRON.iter().for_each(|face| all.push(cell, &face.each_ref().map(point), Bend::Polygon));
+                OF_TETRAHEDRON.iter().for_each(|face| of_bodies.push(cell, &face.each_ref().map(point), Bend::Polygon));
             }
             Faces::Of(solid) => {
                 for face in solid.faces {
@@ -156,17 +156,17 @@ fn all_faces(cells: &Cells, reading: &Reading<'_>) -> Result<OuterFaces, ReadErr
                         Middle::Alternating(..) => Bend::MiddlesOfEdges,
                         Middle::Mean | Middle::Groups(_) => Bend::Polygon,
                     };
-                    all.push(cell, &around, bend);
+                    of_bodies.push(cell, &around, bend);
                 }
             }
-            Faces::Around(faces, _) => faces.iter().for_each(|face| all.push(cell, face, Bend::Polygon)),
+            Faces::Around(faces, _) => faces.iter().for_each(|face| of_bodies.push(cell, face, Bend::Polygon)),
         }
-        input::hold("the faces of cells", all.len() as u64 * BYTES_PER_FACE, reading.params)?;
+        input::hold("the faces of cells", of_bodies.len() as u64 * BYTES_PER_FACE, reading.params)?;
     }
-    Ok(all)
+    Ok(of_bodies)
 }
 
-/// What tells a face from others; `None` of one that is flat, with fewer than three places.
+/// The key of a face, which faces on each other share; `None` of a face whose points lie at fewer than three places: it has no area.
 fn key(around: &[u32], place_of: &[u32]) -> Option<Key> {
     let mut places: Vec<u32> = around.iter().map(|point| place_of[*point as usize]).collect();
     places.sort_unstable();

@@ -219,19 +219,19 @@ impl Shader<'_> {
         let center = simd.lanes(0.5 * (faces.near + faces.far));
         let per_half = simd.lanes(2.0 / slabs.width as f32);
         let sheets = reconstructed.sheets;
-        let own = sheets.load(simd, slab, y, x);
+        let here = sheets.load(simd, slab, y, x);
         let before = sheets.load(simd, slab.max(1) - 1, y, x);
         let after = sheets.load(simd, slab + 1, y, x);
         let mut ends = [[zero; 2]; 2];
         if !reconstructed.prepared.is_lacking(slab) {
             ends = [sheets.load(simd, slab.max(2) - 2, y, x), sheets.load(simd, slab + 2, y, x)];
         }
-        let [value, weight] = own;
+        let [value, weight] = here;
         let middle = center.max(near).min(far);
         let course = Course {
             value,
-            before: (at_face(simd, [ends[0], before, own, after]) - value) * per_half,
-            after: (at_face(simd, [ends[1], after, own, before]) - value) * per_half,
+            before: (at_face(simd, [ends[0], before, here, after]) - value) * per_half,
+            after: (at_face(simd, [ends[1], after, here, before]) - value) * per_half,
         };
         let values = Values {
             near: course.at(simd, near - center),

@@ -1,7 +1,7 @@
 //! The changes of a view, step by step, so that each can be taken back.
 
+use super::State;
 use crate::event::Event;
-use crate::state::State;
 use crate::viewpoint::Viewpoint;
 use organza::Error;
 use organza::scene::Scene;
@@ -18,7 +18,7 @@ pub(crate) struct History {
     past: VecDeque<State>,
     /// From the one that was taken back first.
     future: Vec<State>,
-    /// What the last event changed, while the next one may belong to the same step.
+    /// What the last event changed; `None` where the next event begins a step in any case.
     subject: Option<String>,
 }
 
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(history.present(), &end);
         take(&mut history, &opacity("b", 0.1));
         assert!(!history.can_redo());
-        // One that is refused is no step.
+        // An event that is refused changes nothing, and makes no step.
         let steps = history.past.len();
         assert!(history.apply(&opacity("c", 0.1), &scene, &first).is_err());
         assert_eq!(history.past.len(), steps);
