@@ -93,6 +93,8 @@ struct Papers {
     newest: Option<Arc<Request>>,
     /// Generation of the request that was taken last.
     taken: u64,
+    /// Generation of the request that was the newest when the hand let go last.
+    let_go: u64,
     at_work: Option<AtWork>,
     pictures: u64,
     picture: Option<Arc<Picture>>,
@@ -157,6 +159,7 @@ impl Desk {
             version: 0,
             newest: None,
             taken: 0,
+            let_go: 0,
             at_work: None,
             pictures: 0,
             picture: None,
@@ -250,6 +253,13 @@ impl Desk {
         papers.failure = None;
         papers.newest = Some(Arc::new(request));
         self.tell(papers);
+    }
+
+    /// The hand has let go: the newest request is unlikely to be followed by another at once.
+    pub(crate) fn let_go(&self) {
+        let mut papers = self.papers();
+        papers.let_go = papers.newest.as_ref().map_or(0, |newest| newest.generation);
+        self.changed.notify_all();
     }
 
     /// Has the artist forget what it read and made, and draw nothing until [`Desk::wake`]; false where that takes too long.
@@ -453,14 +463,15 @@ impl Desk {
         }
     }
 
-    /// Waits a while for another request; whether this one is still the newest, and the desk open.
+    /// Waits a while for another request, unless the hand has let go; whether this one is still the newest, and the desk open.
     pub(crate) fn stays_newest(&self, generation: u64, patience: Duration) -> bool {
         let end = Instant::now() + patience;
         let mut papers = self.papers();
         loop {
             let is_newest = papers.newest.as_ref().is_some_and(|newest| newest.generation == generation);
             let left = end.saturating_duration_since(Instant::now());
-            if papers.is_closed || !is_newest || left.is_zero() {
+            let has_let_go = papers.let_go == generation;
+            if papers.is_closed || !is_newest || has_let_go || left.is_zero() {
                 return is_newest && !papers.is_closed;
             }
             papers = self.changed.wait_timeout(papers, left).unwrap_or_else(PoisonError::into_inner).0;

@@ -68,7 +68,7 @@ pub enum Event {
     Redo {},
     /// Takes all changes back but those of the viewpoint and of the size.
     Restore {},
-    /// Ends a step: what follows is another one, though it changes the same.
+    /// The hand lets go: what follows is another step, though it changes the same, and the whole picture need not wait for it.
     Done {},
     /// Shows or hides an object.
     Show {

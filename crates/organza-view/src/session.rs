@@ -323,6 +323,9 @@ impl Session {
         } else {
             studio.take(history, &self.desk)?;
         }
+        if let Some(Event::Done {}) = events.last() {
+            self.desk.let_go();
+        }
         if let Some(recording) = &mut studio.recording {
             recording.add(events);
         }

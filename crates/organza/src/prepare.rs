@@ -23,7 +23,7 @@ use crate::predict::prediction;
 use crate::scene::{
     EffectKind, FoundCamera, Scene, SceneLight, SceneObject, Source, SwitchedEffect, Technique, light_points,
 };
-use crate::shadows::{Probe, Shadowing, casters_by_light};
+use crate::shadows::{Probe, ShadowTable, Shadowing, casters_by_light};
 use crate::statistics::{ObjectData, ObjectStatistics, Statistics};
 use crate::technique::{Fold, Row};
 use crate::{Context, CostRecord, Error, Progress, RenderOptions, SplatCount, escape_controls, shadows, warnings};
@@ -72,7 +72,7 @@ pub fn explain(scene: &Scene, options: &RenderOptions, progress: &Progress) -> R
 pub fn explain_from(scene: &Scene, context: Context<'_>) -> Result<Explanation, Error> {
     let (scene, found) = settled(scene, context)?;
     let Context { options, progress, .. } = context;
-    let Prepared { scene, loaded, planned, mut explanation } = prepare(&scene, context, None, EyeMap::WhereNeeded)?;
+    let Prepared { scene, loaded, planned, mut explanation } = prepare(&scene, context, None, Purpose::Picture)?;
     let frame = Frame::new(&scene, &loaded, &planned.plan, progress);
     let mut folds: Vec<Box<dyn Fold + '_>> =
         planned.plan.techniques.iter().map(|technique| (row(*technique).begin)(&frame)).collect();
@@ -118,13 +118,14 @@ pub(crate) struct Prepared<'a> {
     pub(crate) explanation: Explanation,
 }
 
-/// Whether light that a thick splat sends to the eye is attenuated within it.
+/// What a plan is made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum EyeMap {
-    /// Wherever splats are thick.
-    WhereNeeded,
-    /// Never: a preview is as bright within a few percent, and its map would be built anew for each view.
-    Never,
+pub(crate) enum Purpose {
+    /// A picture.
+    Picture,
+    /// A preview. Light that a thick splat sends to the eye is not attenuated within it: the preview is as bright within a few percent, and the map of the
+    /// eye would be built anew for each view. Cells of shadow maps that are asked for give way where a hand would wait for them.
+    Preview,
 }
 
 /// Loads and plans; `made` is what was loaded of another scene that serves this one, and its plan where [`turned`] says that it serves, too.
@@ -132,7 +133,7 @@ pub(crate) fn prepare<'a>(
     scene: &'a Scene,
     context: Context<'_>,
     made: Option<(Loaded, Option<Planned>)>,
-    eye_map: EyeMap,
+    purpose: Purpose,
 ) -> Result<Prepared<'a>, Error> {
     let Context { files, options, .. } = context;
     let mut cost = CostRecord::default();
@@ -165,7 +166,7 @@ pub(crate) fn prepare<'a>(
     let mut gathering = 0;
     let planned = match planned {
         Some(planned) => {
-            plan_counted(&scene, &loaded, options, Effects::from_planned(&planned), Some(planned.plan), eye_map)?
+            plan_counted(&scene, &loaded, options, Effects::from_planned(&planned), Some(planned.plan), purpose)?
         }
         None => {
             let both = loaded.cloud.bytes().saturating_mul(2);
@@ -185,7 +186,7 @@ pub(crate) fn prepare<'a>(
                 effects = plan_effects(&scene, &loaded, census, &left_out, spent, both <= options.max_memory)?;
             }
             effects.plan.left_out = switched;
-            plan_counted(&scene, &loaded, options, effects, None, eye_map)?
+            plan_counted(&scene, &loaded, options, effects, None, purpose)?
         }
     };
     let plan = planned.plan.clone();
@@ -334,7 +335,7 @@ pub fn plan_loaded(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> R
 /// The same with what it takes and follows from. Effects of objects are kept, whatever their bounds.
 pub(crate) fn plan_alone(scene: &Scene, loaded: &Loaded, options: &RenderOptions) -> Result<Planned, Error> {
     let effects = plan_effects(scene, loaded, SplatCensus::new(scene, loaded), &[], 0.0, false)?;
-    plan_counted(scene, loaded, options, effects, None, EyeMap::WhereNeeded)
+    plan_counted(scene, loaded, options, effects, None, Purpose::Picture)
 }
 
 /// Refuses 3D Gaussians, images as footprints, and splats of media that a file has beside others, where a technique leaves them out.
@@ -384,7 +385,7 @@ fn plan_counted(
     options: &RenderOptions,
     effects: Effects,
     before: Option<Plan>,
-    eye_map: EyeMap,
+    purpose: Purpose,
 ) -> Result<Planned, Error> {
     check_samples(scene)?;
     let is_new = before.is_none();
@@ -428,7 +429,10 @@ fn plan_counted(
         let casting: Vec<_> = plan.casters.iter().map(|kept| shadows::casting(&loaded.objects, kept)).collect();
         let others = plan.others(loaded);
         let requests = carried::requested_maps(loaded, &points, &casting, others.as_deref(), &plan);
-        let tables = shadows::tables(&scene.render, loaded, &requests, left)?;
+        let mut tables = shadows::tables(&scene.render, loaded, &requests, left)?;
+        if purpose == Purpose::Preview {
+            tables.iter_mut().flatten().for_each(ShadowTable::hurry);
+        }
         plan.set_shadow_tables(&points, tables, left);
     } else {
         plan.allow_shadows(left);
@@ -436,7 +440,7 @@ fn plan_counted(
     // Of the view, which may be another than that of the maps.
     plan.set_eye_table(None);
     let left = left.saturating_sub(shadows::bytes(plan.tables()));
-    if eye_map == EyeMap::WhereNeeded && plan.shadow_maps.contains(&true) {
+    if purpose == Purpose::Picture && plan.shadow_maps.contains(&true) {
         let eye = shadows::eye_table(loaded, &plan.shown, &plan.draws, left)?;
         plan.set_eye_table(eye);
     }

@@ -15,7 +15,7 @@ use crate::plan::Plan;
 use crate::predict::prediction;
 use crate::prepare::ranges::ranges;
 use crate::prepare::{
-    Explanation, EyeMap, Planned, Prepared, is_brighter, load_measured, plan_alone, prepare, same_splats, settled,
+    Explanation, Planned, Prepared, Purpose, is_brighter, load_measured, plan_alone, prepare, same_splats, settled,
     splats_serve, turned,
 };
 use crate::scene::{FoundCamera, Scene, SceneObject, Technique};
@@ -162,8 +162,8 @@ impl Left {
         }
     }
 
-    const fn eye_map(&self) -> EyeMap {
-        if self.is_preview { EyeMap::Never } else { EyeMap::WhereNeeded }
+    const fn purpose(&self) -> Purpose {
+        if self.is_preview { Purpose::Preview } else { Purpose::Picture }
     }
 
     /// Lets files go that take more than their share, or than is left beside `other` bytes, or that no frame needs; sets may take what
@@ -274,7 +274,7 @@ pub(crate) fn render_keeping(
     let Served { made, mut leaves, uncut } = served;
     let stated = scene;
     let Prepared { scene, loaded, planned, explanation } =
-        prepare(stated, Context { files: &left.files, options, progress }, made, left.eye_map())?;
+        prepare(stated, Context { files: &left.files, options, progress }, made, left.purpose())?;
     let scene = &*scene;
     let plan = &planned.plan;
     let bytes = planned.memory.total();
@@ -348,7 +348,7 @@ pub(crate) fn prepare_keeping(
     let (scene, _) = settled(scene, Context { files: &left.files, options, progress })?;
     let Served { made, leaves, uncut } = left.take_made(&scene, options.max_memory);
     let Prepared { loaded, planned, .. } =
-        prepare(&scene, Context { files: &left.files, options, progress }, made, left.eye_map())?;
+        prepare(&scene, Context { files: &left.files, options, progress }, made, left.purpose())?;
     let is_whole = planned.plan.left_out.is_empty();
     left.made = is_whole.then(|| Made { scene: scene.into_owned(), loaded, planned, leaves, uncut });
     Ok(())

@@ -15,15 +15,13 @@ let isOpen = true;
 
 let waiting = [];
 let isSending = false;
-/// Events that change no step: those of the viewpoint, which stays, and those about steps.
-const NO_STEPS = ["orbit", "pan", "zoom", "look_from", "reset", "undo", "redo", "done"];
-/// Whether a change was made since the last step has ended.
+/// Whether there was an event since the hand last let go.
 let isChanging = false;
 /// What the page says once they are taken.
 let afterwards = "";
 
 function add(event) {
-  isChanging = event.do !== "done" && (isChanging || !NO_STEPS.includes(event.do));
+  isChanging = event.do !== "done";
   const last = waiting[waiting.length - 1];
   const adds = { orbit: ["right", "up"], pan: ["right", "up"], zoom: ["steps"] }[event.do];
   const replaces = {
@@ -39,7 +37,7 @@ function add(event) {
   send();
 }
 
-/// A step ends when the hand lets go: behind the listeners of what it held.
+/// A step ends when the hand lets go, and the whole picture begins: behind the listeners of what it held.
 for (const name of ["pointerup", "click", "change", "keyup"]) {
   document.addEventListener(name, () => setTimeout(() => isChanging && add({ do: "done" })));
 }

@@ -381,6 +381,22 @@ mod tests {
     }
 
     #[test]
+    fn previews_do_not_wait_for_the_cells_that_are_asked_for() {
+        let options = RenderOptions::default();
+        let progress = Progress::new();
+        let cells = |mut sequence: Sequence, asked: u32| {
+            let asked = format!("light.lamp.shadow_cells={asked}");
+            let scene = Scene { frames: Some(2), ..changed(&[asked.as_str()]) };
+            let render = sequence.render(&scene, &options, &progress).unwrap();
+            let tables = render.plan.tables().filter_map(|table| table.cells);
+            tables.collect::<Vec<_>>()
+        };
+        let preview = |asked| cells(Sequence::of_previews(Files::default()), asked);
+        // Few cells cost little; a picture has as many as are asked for.
+        assert_eq!((preview(64), preview(1024), cells(Sequence::default(), 1024)), (vec![64], vec![], vec![1024]));
+    }
+
+    #[test]
     fn previews_of_thick_media_have_no_map_of_the_eye() {
         let options = RenderOptions::default();
         let progress = Progress::new();
