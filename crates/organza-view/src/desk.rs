@@ -552,3 +552,51 @@ impl Desk {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use organza::scene::{LoadOptions, parse};
+
+    const SCENE: &[u8] = br#"
+        version = 1
+        [camera]
+        position = [0, 0, 2]
+        target = [0, 0, 0]
+        size = [8, 8]
+        [[object]]
+        name = "pane"
+        rectangle = { center = [0, 0, 0], u = [1, 0, 0], v = [0, 1, 0], spacing = 0.5 }
+    "#;
+
+    fn request(generation: u64) -> Request {
+        let scene = parse("pane.toml".as_ref(), SCENE, &LoadOptions::default()).unwrap();
+        Request {
+            generation,
+            stated: scene.clone(),
+            scene,
+            uncut: Arc::default(),
+            accuracy: Accuracy::default(),
+            told: String::new(),
+            layer: None,
+            edition: 0,
+            has_own_camera: true,
+        }
+    }
+
+    #[test]
+    fn nobody_waits_once_the_hand_has_let_go() {
+        let desk = Desk::new(Viewpoint::of_scene(&request(1).scene));
+        let hour = Duration::from_secs(3600);
+        desk.ask(request(1));
+        desk.let_go();
+        // Both would last an hour.
+        assert!(desk.stays_newest(1, hour));
+        desk.ask(request(2));
+        assert!(!desk.stays_newest(1, hour));
+        // Another drag is another wait.
+        assert!(desk.stays_newest(2, Duration::ZERO) && desk.papers().let_go == 1);
+        desk.close();
+        assert!(!desk.stays_newest(2, hour));
+    }
+}
