@@ -118,7 +118,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) explanation: Explanation,
 }
 
-/// What a plan is made for.
+/// The purpose of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// A picture.

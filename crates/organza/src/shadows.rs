@@ -31,8 +31,8 @@ pub(crate) const SEEN: f32 = 0.125;
 pub(crate) const EYE: &str = "the eye";
 /// Entries of a shadow map up to which a preview has the cells that are asked for: tens of milliseconds.
 const QUICK: f64 = 2e6;
-/// Times the entries of the automatic resolution up to which it has them all the same: shadows do not change their sharpness when the picture follows.
-const TIMES: f64 = 4.0;
+/// Times the entries of the automatic resolution from which on cells that are asked for count as costly.
+pub(crate) const TIMES: f64 = 4.0;
 /// Straight optical depths of a thick cell that lists go on for: as many as it has along the most slanted light.
 const CELLS_BEHIND: f64 = 5.0;
 
@@ -74,8 +74,8 @@ impl ShadowTable {
         shadow_params(settings, loaded, self.cells, self.tolerance, self.max_bytes.min(left))
     }
 
-    /// Takes the automatic resolution where the cells that are asked for would keep a preview waiting. They are so many along a side of what casts
-    /// shadows: where the ground is hidden, those of a table on it are many times as fine.
+    /// Takes the automatic resolution where the cells that are asked for would keep a preview waiting. So many lie along a side of what casts shadows,
+    /// however short that is: where the ground is hidden, they are many times as fine.
     pub(crate) fn hurry(&mut self) {
         let Self { predicted, automatic, .. } = *self;
         if predicted.entries > QUICK && predicted.entries > TIMES * automatic.entries {

@@ -11,7 +11,7 @@ use crate::load::{Loaded, normalize::object_bounds, own::Own};
 use crate::plan::{Effect, Plan};
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject, Source};
-use crate::shadows::{Coarse, thickness_of};
+use crate::shadows::{Coarse, TIMES, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 pub(crate) use keys::{idle_cells, without_part};
@@ -30,9 +30,8 @@ const CELLS_STEP: f64 = 64.0;
 const SURE: f64 = 0.75;
 /// How many times the cells of a side have to grow for the picture to change by it.
 const WORTH: f64 = 1.25;
-/// Entries of a shadow map that take some seconds to build, and how many times those of the automatic resolution are told.
+/// Entries of a shadow map that take some seconds to build.
 const COSTLY: f64 = 2e7;
-const TIMES: f64 = 4.0;
 /// Most objects outside the view that are told one by one.
 const TOLD: usize = 4;
 /// Optical depth of a spacing up to which the light of layers of splats is held to closed forms.
