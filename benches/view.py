@@ -159,7 +159,7 @@ def row(program, source, size):
     view.wait_for_quiet()
     drag, drag_clock = view.drag()
     begun = time.monotonic()
-    view.send({"do": "reset"})
+    view.send({"do": "reset"}, {"do": "done"})
     state = view.wait_for_whole()
     whole = 1e3 * (time.monotonic() - begun)
     lights = [light["name"] for light in state["lights"]]

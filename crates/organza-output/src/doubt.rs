@@ -33,7 +33,8 @@ pub fn doubt(beauty: &[[f32; 3]], exposure: f64) -> Option<String> {
         ));
     }
     let shown = |pixel: &[f32; 3]| pixel.map(|v| displayed(v * gain));
-    let is_even = beauty.len() > 1 && beauty.iter().all(|pixel| shown(pixel) == shown(&beauty[0]));
+    let first = shown(&beauty[0]);
+    let is_even = beauty.len() > 1 && beauty.iter().all(|pixel| shown(pixel) == first);
     is_even.then(|| {
         "the picture is all of one colour: no object stands out from what is behind it; look whether objects lie in the view, are large \
          enough, and have colours or light of their own"

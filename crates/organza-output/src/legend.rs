@@ -11,7 +11,7 @@ mod ticks;
 pub(super) use canvas::Canvas;
 
 use crate::LegendPlace;
-use crate::png_file::encoded;
+use crate::display::encoded;
 use organza_scene::{ColorScale, MapScale, ScaleNumbers};
 use splat_core::{LayerData, Layers};
 use std::ops::Range;

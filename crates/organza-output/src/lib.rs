@@ -19,6 +19,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod display;
 mod doubt;
 mod error;
 mod exr_file;
@@ -30,9 +31,9 @@ mod targets;
 mod texts;
 mod webp_file;
 
+pub use display::displayed;
 pub use doubt::doubt;
 pub use error::Error;
-pub use png_file::displayed;
 pub use target::{Target, abandon};
 pub use targets::Targets;
 

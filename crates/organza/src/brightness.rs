@@ -2,17 +2,15 @@
 //! of each object.
 
 use crate::load::Loaded;
+use crate::load::by_object::by_object;
 use crate::load::own::Own;
 use crate::scene::{Scene, light_points};
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 use splat_core::shade::LitBy;
 use splat_core::{DAabb, Material, Shading, SplatKind};
 
 /// Standard deviation of a splat over its radius, at least: so near its light comes.
 const LEAST_DEVIATION: f64 = 0.25;
-/// Splats that one thread looks at.
-const CHUNK: usize = 1 << 14;
 
 /// Units of optical depth in sums, which are whole numbers: those know no order of threads.
 const UNIT: f64 = (1u64 << 29) as f64;
@@ -169,20 +167,9 @@ fn radiance_given_off(material: &Material, color: f64) -> f64 {
 /// The splats of each object.
 fn splats(loaded: &Loaded) -> Vec<Receiver> {
     let cloud = &loaded.cloud;
-    let nothing = || vec![Receiver::NOTHING; loaded.objects.len()];
     let norms: Vec<f64> = loaded.footprints.layers().iter().map(|footprint| footprint.norm()).collect();
-    let chunk = |chunk: usize| {
-        let mut receivers = nothing();
-        for i in chunk * CHUNK..cloud.len().min((chunk + 1) * CHUNK) {
-            receivers[cloud.object[i] as usize].join(&splat(loaded, &norms, i));
-        }
-        receivers
-    };
-    // Least and greatest numbers are the same in any order.
-    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().map(chunk).reduce(nothing, |mut joined, receivers| {
-        joined.iter_mut().zip(&receivers).for_each(|(a, b)| a.join(b));
-        joined
-    })
+    let meet = |receiver: &mut Receiver, i: usize| receiver.join(&splat(loaded, &norms, i));
+    by_object(cloud, loaded.objects.len(), &Receiver::NOTHING, meet, Receiver::join)
 }
 
 /// A splat; `norms` are those of the footprints.

@@ -1,6 +1,7 @@
 //! The objects of a scene become one cloud in canonical order, with its tables.
 
 mod boxes;
+pub(crate) mod by_object;
 pub(crate) mod context;
 pub(crate) mod files;
 mod fit;

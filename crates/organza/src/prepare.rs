@@ -348,7 +348,8 @@ fn check_splats(scene: &Scene, loaded: &Loaded) -> Result<(), Error> {
         return refuse(object, "3D Gaussians, which its technique does not draw");
     }
     let discs_alone: Vec<bool> = scene.objects.iter().map(|o| by(o).meets_discs).collect();
-    let mut splats = loaded.cloud.kind.iter().zip(&loaded.cloud.object);
+    let looked_at = if discs_alone.contains(&true) { loaded.cloud.len() } else { 0 };
+    let mut splats = loaded.cloud.kind.iter().zip(&loaded.cloud.object).take(looked_at);
     let medium = splats.find(|(kind, o)| **kind == SplatKind::Medium && discs_alone[**o as usize]);
     let object = |i: usize| &scene.objects[loaded.cloud.object[i] as usize];
     let alone = |by: &Row, kind| by.meets_discs || !by.draws_splats && kind == SplatKind::Surface;

@@ -6,18 +6,16 @@ mod probe;
 
 use crate::Error;
 use crate::load::Loaded;
+use crate::load::by_object::by_object;
 use crate::scene::{LightPoint, RenderSettings, ShadowMapping};
-use rayon::prelude::*;
 use splat_core::shade::joint::{HIDDEN, MediumSpacing};
-use splat_core::{Camera, Light, LightShape, Limits, Object};
+use splat_core::{Camera, Light, LightShape, Limits, LitBounds, Object};
 use tsm::{Deposits, Params};
 
 pub(crate) use casters::{Shadowing, casting};
 pub(crate) use hiding::{Hiding, View, casters_by_light, hiding};
 pub(crate) use probe::Probe;
 
-/// Splats of a task.
-const CHUNK: usize = 1 << 12;
 /// Share of the tolerance that the ends of lists may take, of all lights together. Absorbance grows with its logarithm only, so
 /// a small share costs little.
 pub(crate) const CUT_SHARE: f64 = 1.0 / 16.0;
@@ -128,10 +126,15 @@ pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Par
     Params { tolerance, footprints, refines_lit: false, limits: Limits::bytes(max_bytes), ..Params::default() }
 }
 
-/// Greatest optical depth of a spacing among the media of a loaded scene; 0 where it is thin everywhere.
-fn thickest(loaded: &Loaded) -> f64 {
-    let splats = (0..loaded.cloud.len()).into_par_iter().with_min_len(CHUNK);
-    let thickest = splats.map(|i| thickness_of(loaded, i)).reduce(|| 0.0, f32::max);
+/// Greatest optical depth of a spacing among the media of each object of a loaded scene.
+fn thickest_of_objects(loaded: &Loaded) -> Vec<f32> {
+    let meet = |thickest: &mut f32, i: usize| *thickest = thickest.max(thickness_of(loaded, i));
+    by_object(&loaded.cloud, loaded.objects.len(), &0.0, meet, |thickest, other| *thickest = thickest.max(*other))
+}
+
+/// The greatest of all objects; 0 where media are thin everywhere.
+fn thickest(of_objects: &[f32]) -> f64 {
+    let thickest = of_objects.iter().copied().fold(0.0, f32::max);
     if thickest > SEEN { f64::from(thickest) } else { 0.0 }
 }
 
@@ -155,14 +158,14 @@ pub(crate) fn eye(camera: &Camera) -> Light {
 /// The objects that the eye's map is of: those that are `shown` with media whose spacing is optically thick. What else there is hides a thick cell as
 /// a whole.
 pub(crate) fn thick_objects(loaded: &Loaded, shown: &[bool]) -> Vec<Object> {
-    let mut objects: Vec<Object> =
-        loaded.objects.iter().map(|object| Object { casts_shadow: false, ..object.clone() }).collect();
-    for (i, object) in loaded.cloud.object.iter().enumerate() {
-        let is_shown = shown[*object as usize];
-        let object = &mut objects[*object as usize];
-        object.casts_shadow = object.casts_shadow || is_shown && thickness_of(loaded, i) > SEEN;
-    }
+    thicker_than_seen(loaded, &thickest_of_objects(loaded), shown)
+}
+
+fn thicker_than_seen(loaded: &Loaded, thickest: &[f32], shown: &[bool]) -> Vec<Object> {
+    let objects = loaded.objects.iter().zip(thickest).zip(shown);
     objects
+        .map(|((object, thickest), shown)| Object { casts_shadow: *shown && *thickest > SEEN, ..object.clone() })
+        .collect()
 }
 
 /// The table of the eye's map, within so many bytes; `None` where all media that receive shadows, are `shown` and are drawn as splats, which `draws`
@@ -177,20 +180,17 @@ pub(crate) fn eye_table(
     max_bytes: u64,
 ) -> Result<Option<ShadowTable>, Error> {
     let cloud = &loaded.cloud;
-    let is_lit_within = |i: usize| {
-        let object = cloud.object[i] as usize;
-        draws[object]
-            && shown[object]
-            && loaded.objects[object].shadow_coefficient > 0.0
-            && thickness_of(loaded, i) > SEEN
+    let of_objects = thickest_of_objects(loaded);
+    let is_lit_within = |object: usize| {
+        draws[object] && shown[object] && loaded.objects[object].shadow_coefficient > 0.0 && of_objects[object] > SEEN
     };
-    if !(0..cloud.len()).any(is_lit_within) {
+    if !(0..loaded.objects.len()).any(is_lit_within) {
         return Ok(None);
     }
     let tolerance =
-        libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(loaded)).max(f64::from(f32::MIN_POSITIVE)) as f32;
+        libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(&of_objects)).max(f64::from(f32::MIN_POSITIVE)) as f32;
     let params = eye_params(loaded, tolerance, max_bytes);
-    let objects = thick_objects(loaded, shown);
+    let objects = thicker_than_seen(loaded, &of_objects, shown);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
     let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
     Ok(Some(ShadowTable {
@@ -205,11 +205,18 @@ pub(crate) fn eye_table(
 
 /// Transmittance e^(−A_cut) below which the light of one lamp is lost in the picture: its brightest light times that changes no
 /// displayed value by more than the lamp's part of the tolerance. Thick cells are lit by what is left behind them, too.
-fn tolerance(settings: &RenderSettings, loaded: &Loaded, point: &LightPoint, maps: u64, thickest: f64) -> f32 {
+fn tolerance(
+    settings: &RenderSettings,
+    loaded: &Loaded,
+    lit: &LitBounds,
+    point: &LightPoint,
+    maps: u64,
+    thickest: f64,
+) -> f32 {
     let of_lights = || {
         let passing =
             loaded.images.slides[point.light_index].as_ref().map_or(1.0, |slide| f64::from(slide.brightest()));
-        let brightest = passing * point.light.brightest_on(&loaded.cloud);
+        let brightest = passing * lit.brightest_of(&point.light);
         let gain = DISPLAY_SLOPE * libm::exp2(settings.exposure) * brightest.max(f64::MIN_POSITIVE);
         CUT_SHARE * settings.tolerance / (gain * maps as f64)
     };
@@ -266,11 +273,12 @@ fn tables_within(
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
     let maps = requests.iter().flatten().count().max(1) as u64;
-    let thickest = thickest(loaded);
+    let thickest = thickest(&thickest_of_objects(loaded));
+    let lit = LitBounds::new(&loaded.cloud);
     let table = |request: &Option<MapRequest<'_>>| {
         let Some((point, objects)) = request else { return Ok(None) };
         let light = &point.light;
-        let tolerance = tolerance(settings, loaded, point, maps, thickest);
+        let tolerance = tolerance(settings, loaded, &lit, point, maps, thickest);
         let cells = point.shadow_cells.or(settings.shadow.cells);
         let params = shadow_params(settings, loaded, cells, tolerance, max_bytes);
         let scene = tsm::Scene { cloud: &loaded.cloud, materials: &loaded.materials, objects };

@@ -7,7 +7,7 @@ mod small;
 
 use crate::choose::row;
 use crate::form::PlannedObject;
-use crate::load::{Loaded, normalize::object_bounds, own::Own};
+use crate::load::{Loaded, by_object::by_object, normalize::object_bounds, own::Own};
 use crate::plan::{Effect, Plan};
 use crate::scene::place;
 use crate::scene::{Scene, SceneLight, SceneObject, Source};
@@ -15,7 +15,6 @@ use crate::shadows::{Coarse, TIMES, thickness_of};
 use crate::{Layers, ShadowTable, escape_controls};
 use glam::DVec3;
 pub(crate) use keys::{idle_cells, without_part};
-use rayon::prelude::*;
 use splat_core::raster::objects_in_view;
 use splat_core::shade::joint::MediumSpacing;
 use splat_core::{DAabb, Object, Projection, SplatKind};
@@ -159,7 +158,9 @@ impl Thickness {
 
     fn join(&mut self, other: &Self) {
         self.bounds = self.bounds.union(other.bounds);
-        if other.optical_depth > self.optical_depth {
+        // Of splats that are alike the narrowest, whichever is met first.
+        let is_alike = other.optical_depth == self.optical_depth;
+        if other.optical_depth > self.optical_depth || is_alike && other.spacing < self.spacing {
             self.optical_depth = other.optical_depth;
             self.spacing = other.spacing;
         }
@@ -168,28 +169,16 @@ impl Thickness {
 
 /// What is known of the medium of each object.
 fn thicknesses(loaded: &Loaded) -> Vec<Thickness> {
-    const PARTS: usize = 64;
-    let splats = loaded.cloud.len();
-    let part = splats.div_ceil(PARTS).max(1 << 12);
-    let of_part = |first: usize| {
-        let mut media = vec![Thickness::NONE; loaded.objects.len()];
-        for i in first..splats.min(first + part) {
-            let Some(spacing) = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i) else { continue };
-            let place = loaded.cloud.position[i].as_dvec3();
-            media[loaded.cloud.object[i] as usize].join(&Thickness {
-                optical_depth: thickness_of(loaded, i),
-                spacing: spacing.width,
-                bounds: DAabb::new(place, place),
-            });
-        }
-        media
+    let meet = |medium: &mut Thickness, i: usize| {
+        let Some(spacing) = MediumSpacing::of_splat(&loaded.cloud, &loaded.footprints, i) else { return };
+        let place = loaded.cloud.position[i].as_dvec3();
+        medium.join(&Thickness {
+            optical_depth: thickness_of(loaded, i),
+            spacing: spacing.width,
+            bounds: DAabb::new(place, place),
+        });
     };
-    let parts: Vec<Vec<Thickness>> = (0..splats).into_par_iter().step_by(part).map(of_part).collect();
-    let mut media = vec![Thickness::NONE; loaded.objects.len()];
-    for found in &parts {
-        media.iter_mut().zip(found).for_each(|(medium, of_part)| medium.join(of_part));
-    }
-    media
+    by_object(&loaded.cloud, loaded.objects.len(), &Thickness::NONE, meet, Thickness::join)
 }
 
 /// Media that are so thick that splats do not tell their light, or the maps of sheets that of their edges.

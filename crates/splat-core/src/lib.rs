@@ -76,7 +76,7 @@ pub use points::{Column, PointCell, PointLattice, RawPoints, ReadySplats};
 pub use relative::Relative;
 pub use scene::camera::{Camera, Projection, ViewTransform};
 pub use scene::environment::{Environment, RadianceImage};
-pub use scene::light::{Framing, Incidence, Light, LightKey, LightShape, Slide, SlideProjection};
+pub use scene::light::{Framing, Incidence, Light, LightKey, LightShape, LitBounds, Slide, SlideProjection};
 pub use scene::material::{Bump, Material, MaterialTable, Object, ObjectTable, Reflection, Shading};
 pub use scene::phase::henyey_greenstein;
 pub use scene::transfer::{TransferFunction, TransferPoint};

@@ -1,14 +1,11 @@
 //! Scenes of any size become scenes of size one, by a power of two, so that squares of lengths neither overflow nor vanish
 //! in f32 and a scene scaled by a power of two gives the same picture bit by bit.
 
+use super::by_object::by_object;
 use super::own::Own;
 use crate::scene::SceneLight;
 use glam::Vec3;
-use rayon::prelude::*;
 use splat_core::{Aabb, Camera, Cloud, DAabb, Slide};
-
-/// Splats that one thread looks at before it helps another: the boxes of a thousand objects take less time than so many.
-const SPLATS_AT_A_TIME: usize = 1 << 14;
 
 /// Scales everything by 2^−e, where 2^e is the size of the bounds of all splats and objects, and returns e.
 ///
@@ -46,15 +43,11 @@ fn bounds(cloud: &Cloud, natives: &[Own]) -> DAabb {
 
 /// The bounds of each of so many objects and its splats; empty where there is nothing of one.
 pub(crate) fn object_bounds(cloud: &Cloud, natives: &[Own], objects: usize) -> Vec<DAabb> {
-    let nothing = || vec![Aabb::EMPTY; objects];
-    let with = |mut boxes: Vec<Aabb>, (object, place): (&u32, &Vec3)| {
-        let around = &mut boxes[*object as usize];
-        *around = around.union(Aabb { min: *place, max: *place });
-        boxes
+    let meet = |around: &mut Aabb, i: usize| {
+        let place = cloud.position[i];
+        *around = around.union(Aabb { min: place, max: place });
     };
-    let join = |a: Vec<Aabb>, b: Vec<Aabb>| a.into_iter().zip(b).map(|(a, b)| a.union(b)).collect();
-    let splats = cloud.object.par_iter().zip(&cloud.position).with_min_len(SPLATS_AT_A_TIME);
-    let splats: Vec<Aabb> = splats.fold(nothing, with).reduce(nothing, join);
+    let splats = by_object(cloud, objects, &Aabb::EMPTY, meet, |around, other| *around = around.union(*other));
     // Nothing stays nothing: its corners are infinite.
     let place = |corner: Vec3| cloud.origin + corner.as_dvec3();
     let mut boxes: Vec<DAabb> = splats.iter().map(|b| DAabb::new(place(b.min), place(b.max))).collect();

@@ -5,6 +5,7 @@
 //! thickness. Opacity is right whatever the number: transmittances multiply in any order.
 
 use crate::frame::Frame;
+use crate::load::by_object::by_object;
 use crate::scene::Technique;
 use crate::technique::EVERYWHERE;
 use splat_core::{SplatKind, turns};
@@ -28,25 +29,25 @@ fn spans(frame: &Frame<'_>) -> Vec<(usize, [f32; 2])> {
     let loaded = frame.loaded;
     let plan = frame.plan;
     let at = |t: Technique| plan.techniques.iter().position(|u| *u == t).unwrap_or(0);
-    let mut of_object: Vec<[f32; 2]> = vec![[f32::INFINITY, f32::NEG_INFINITY]; loaded.objects.len()];
-    let mut meet = |object: usize, [near, far]: [f32; 2]| {
-        let [n, f] = &mut of_object[object];
-        (*n, *f) = (n.min(near), f.max(far));
+    let join = |span: &mut [f32; 2], other: &[f32; 2]| {
+        span[0] = span[0].min(other[0]);
+        span[1] = span[1].max(other[1]);
     };
     let cloud = &loaded.cloud;
     let place = frame.camera.view_from_offset(cloud.origin);
-    for i in 0..cloud.len() {
-        let object = cloud.object[i] as usize;
-        if cloud.kind[i] != SplatKind::Opaque && !plan.is_own[object] {
+    let meet = |span: &mut [f32; 2], i: usize| {
+        if cloud.kind[i] != SplatKind::Opaque && !plan.is_own[cloud.object[i] as usize] {
             let z = place.depth(cloud.position[i]);
             let radius = cloud.radius[i];
-            meet(object, [z - radius, z + radius]);
+            join(span, &[z - radius, z + radius]);
         }
-    }
+    };
+    let nowhere = [f32::INFINITY, f32::NEG_INFINITY];
+    let mut of_object = by_object(cloud, loaded.objects.len(), &nowhere, meet, join);
     for native in &loaded.own {
         for corner in native.world_box().corners() {
             let z = frame.camera.view_from_world(corner).z as f32;
-            meet(native.object, [z, z]);
+            join(&mut of_object[native.object], &[z, z]);
         }
     }
     let farthest = of_object.iter().map(|s| s[1]).filter(|z| z.is_finite()).fold(0.0, f32::max);

@@ -1,6 +1,6 @@
 //! Objects that lie in the view and are smaller than a pixel: files of unlike units or places in one picture.
 
-use crate::load::{Loaded, own::Own};
+use crate::load::{Loaded, by_object::by_object, own::Own};
 use crate::scene::{Scene, place};
 use crate::shown;
 use glam::DVec3;
@@ -45,13 +45,13 @@ pub(super) fn too_small(scene: &Scene, loaded: &Loaded, seen: &[bool]) -> Vec<St
 
 /// A box around each object with its discs, in the normalized world; empty for what has nothing.
 fn boxes(loaded: &Loaded) -> Vec<DAabb> {
-    let mut boxes = vec![DAabb::EMPTY; loaded.objects.len()];
     let cloud = &loaded.cloud;
-    let splats = cloud.object.iter().zip(&cloud.position).zip(&cloud.radius);
-    for ((object, position), radius) in splats {
-        let around = DAabb::around(cloud.origin + position.as_dvec3(), DVec3::splat(f64::from(*radius)));
-        boxes[*object as usize] = boxes[*object as usize].union(around);
-    }
+    let meet = |bounds: &mut DAabb, i: usize| {
+        let around = DVec3::splat(f64::from(cloud.radius[i]));
+        *bounds = bounds.union(DAabb::around(cloud.origin + cloud.position[i].as_dvec3(), around));
+    };
+    let join = |bounds: &mut DAabb, other: &DAabb| *bounds = bounds.union(*other);
+    let mut boxes = by_object(cloud, loaded.objects.len(), &DAabb::EMPTY, meet, join);
     let add = |native: &Own| boxes[native.object] = boxes[native.object].union(native.world_box());
     loaded.own.iter().for_each(add);
     boxes

@@ -2,13 +2,14 @@
 
 use super::OpaqueImage;
 use super::lanes::exp_neg;
-use crate::shade::{ChannelLayout, MAX_CHANNELS};
+use crate::shade::ChannelLayout;
 use crate::{Accumulator, Camera, Environment, LayerData, LayerSet, Layers};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Pixel rows handled by one task.
-const BAND: u32 = 16;
+const BAND: usize = 16;
 
 /// What is seen where nothing else is.
 #[derive(Debug, Clone, Copy)]
@@ -65,17 +66,6 @@ impl GlassImage {
     }
 }
 
-/// One sample with everything behind it added.
-struct Sample {
-    transmittance: [f32; 3],
-    background: [f32; 3],
-    /// `reflection` and `refraction`.
-    glass: [[f32; 3]; 2],
-    values: [f32; MAX_CHANNELS],
-    depth: [f32; 4],
-    object: u32,
-}
-
 /// Samples that are to become a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct FinishInput<'a> {
@@ -100,168 +90,119 @@ pub struct FinishInput<'a> {
 /// Colours, alpha, shadow and normal are box-filtered. `depth.first` is the least of the samples, the other depths are
 /// means over the samples where they are defined, and `object` is that of the first sample that has one.
 pub fn finish(input: &FinishInput<'_>) -> Layers {
-    let FinishInput { accumulator, glass, layout, layers, antialias, .. } = *input;
+    let FinishInput { accumulator, layout, layers, antialias, .. } = *input;
     let size = accumulator.size.map(|s| s / antialias);
-    let bands: Vec<Output> = (0..size[1].div_ceil(BAND))
-        .into_par_iter()
-        .map(|band| {
-            let rows = band * BAND..size[1].min((band + 1) * BAND);
-            let mut out = Output::new(rows.len() * size[0] as usize, layout.count(), glass.is_some());
-            let mut samples = Vec::with_capacity((antialias * antialias) as usize);
-            for (k, (y, x)) in rows.flat_map(|y| (0..size[0]).map(move |x| (y, x))).enumerate() {
-                samples.clear();
-                for sy in y * antialias..(y + 1) * antialias {
-                    for sx in x * antialias..(x + 1) * antialias {
-                        samples.push(sample(input, [sx, sy]));
-                    }
-                }
-                out.pixel(k, &samples);
-            }
-            out
-        })
-        .collect();
-    let mut out = Output::new(0, layout.count(), glass.is_some());
-    bands.into_iter().for_each(|band| out.append(band));
-    out.into_layers(size, layout, layers)
-}
-
-fn sample(input: &FinishInput<'_>, pixel: [u32; 2]) -> Sample {
-    let [x, y] = pixel;
-    let FinishInput { accumulator: acc, opaque, background, .. } = *input;
-    let k = y as usize * acc.size[0] as usize + x as usize;
-    let planes = acc.optical_depth.len();
-    let transmittance: [f32; 3] =
-        std::array::from_fn(|c| exp_neg(acc.optical_depth[if planes == 3 { c } else { 0 }][k]));
-    let solid = opaque.depth.get(k).copied().filter(|d| d.is_finite());
-    let bent = input.glass.and_then(|glass| glass.bent(k));
-    let count = acc.channels.len();
-    let mut values = [0.0; MAX_CHANNELS];
-    for (c, (value, plane)) in values.iter_mut().zip(&acc.channels).enumerate() {
-        *value = plane[k];
-        // Of what lies straight ahead a bent ray shows nothing; what is no light, its normal and shadow, is still told.
-        if solid.is_some() && (bent.is_none() || c >= input.layout.colors()) {
-            *value += transmittance[ChannelLayout::plane_of(c, count, 3)] * opaque.channels[c][k];
+    let mut planes = Planes::new(size[0] as usize * size[1] as usize, input);
+    planes.bands(BAND * size[0] as usize).into_par_iter().enumerate().for_each(|(band, mut rows)| {
+        let mut samples = SampleRow::new(accumulator.size[0] as usize);
+        for row in 0..rows.beauty.len() / size[0] as usize {
+            rows.fill(input, &mut samples, row, band * BAND + row);
         }
-    }
-    let through = if solid.is_some() { [0.0; 3] } else { transmittance };
-    // What is hidden is not looked up.
-    let behind = if through == [0.0; 3] || bent.is_some() { [0.0; 3] } else { background.radiance(x, y) };
-    let unseen = acc.object.get(k).is_none_or(|o| *o == u32::MAX);
-    Sample {
-        transmittance: through,
-        background: std::array::from_fn(|c| through[c] * behind[c]),
-        glass: [
-            input.glass.map_or([0.0; 3], |glass| glass.mirrored[k]),
-            bent.map_or([0.0; 3], |behind| std::array::from_fn(|c| transmittance[c] * behind[c])),
-        ],
-        values,
-        depth: acc.depth.get(k).map_or([f32::INFINITY; 4], |d| d.depths(acc.optical_depth[planes / 2][k], solid)),
-        object: if unseen { opaque.object.get(k).copied().unwrap_or(u32::MAX) } else { acc.object[k] },
-    }
+    });
+    planes.into_layers(size, layout, layers)
 }
 
-/// Pixels being filled.
-struct Output {
-    alpha: Vec<f32>,
+/// The planes of a picture; those that are not asked for are empty.
+struct Planes {
+    beauty: Vec<[f32; 3]>,
     background: Vec<[f32; 3]>,
-    /// `reflection` and `refraction`; empty without.
-    glass: [Vec<[f32; 3]>; 2],
-    /// Channel planes.
-    values: Vec<Vec<f32>>,
+    /// One for each of [`ChannelLayout::effects`].
+    effects: Vec<Vec<[f32; 3]>>,
+    reflection: Vec<[f32; 3]>,
+    refraction: Vec<[f32; 3]>,
+    normal: Vec<[f32; 3]>,
+    shadow: Vec<f32>,
     depth: [Vec<f32>; 4],
     object: Vec<u32>,
+    alpha: Vec<f32>,
 }
 
-impl Output {
-    fn new(n: usize, channels: usize, glass: bool) -> Self {
+/// The same planes over some rows of the picture.
+struct Rows<'a> {
+    beauty: &'a mut [[f32; 3]],
+    background: &'a mut [[f32; 3]],
+    effects: Vec<&'a mut [[f32; 3]]>,
+    reflection: &'a mut [[f32; 3]],
+    refraction: &'a mut [[f32; 3]],
+    normal: &'a mut [[f32; 3]],
+    shadow: &'a mut [f32],
+    depth: [&'a mut [f32]; 4],
+    object: &'a mut [u32],
+    alpha: &'a mut [f32],
+}
+
+impl Planes {
+    /// Nothing seen.
+    fn new(pixels: usize, input: &FinishInput<'_>) -> Self {
+        let FinishInput { layout, layers, glass, .. } = input;
+        let colors = |asked: bool| if asked { vec![[0.0; 3]; pixels] } else { Vec::new() };
         Self {
-            alpha: vec![0.0; n],
-            background: vec![[0.0; 3]; n],
-            glass: std::array::from_fn(|_| if glass { vec![[0.0; 3]; n] } else { Vec::new() }),
-            values: vec![vec![0.0; n]; channels],
-            depth: std::array::from_fn(|_| vec![f32::INFINITY; n]),
-            object: vec![u32::MAX; n],
+            beauty: colors(true),
+            background: colors(true),
+            effects: layout.effects().map(|_| colors(true)).collect(),
+            reflection: colors(glass.is_some()),
+            refraction: colors(glass.is_some()),
+            normal: colors(layout.normal().is_some()),
+            shadow: vec![0.0; if layout.shadow().is_some() { pixels } else { 0 }],
+            depth: std::array::from_fn(|_| vec![f32::INFINITY; if layers.depth { pixels } else { 0 }]),
+            object: vec![u32::MAX; if layers.object { pixels } else { 0 }],
+            alpha: vec![0.0; pixels],
         }
     }
 
-    /// Appends the pixels of the next band.
-    fn append(&mut self, band: Self) {
-        self.alpha.extend(band.alpha);
-        self.background.extend(band.background);
-        self.glass.iter_mut().zip(band.glass).for_each(|(to, from)| to.extend(from));
-        self.values.iter_mut().zip(band.values).for_each(|(to, from)| to.extend(from));
-        self.depth.iter_mut().zip(band.depth).for_each(|(to, from)| to.extend(from));
-        self.object.extend(band.object);
-    }
-
-    fn pixel(&mut self, k: usize, samples: &[Sample]) {
-        let share = 1.0 / samples.len() as f32;
-        for s in samples {
-            self.alpha[k] += share * (1.0 - (s.transmittance[0] + s.transmittance[1] + s.transmittance[2]) / 3.0);
-            for c in 0..3 {
-                self.background[k][c] += share * s.background[c];
-                for (plane, effect) in self.glass.iter_mut().zip(&s.glass) {
-                    plane.get_mut(k).into_iter().for_each(|sum| sum[c] += share * effect[c]);
-                }
-            }
-            for (plane, value) in self.values.iter_mut().zip(&s.values) {
-                plane[k] += share * value;
-            }
-            if self.object[k] == u32::MAX {
-                self.object[k] = s.object;
-            }
-            self.depth[0][k] = self.depth[0][k].min(s.depth[0]);
+    /// Bands of `length` pixels, the last of what is left.
+    fn bands(&mut self, length: usize) -> Vec<Rows<'_>> {
+        let bands = self.beauty.len().div_ceil(length);
+        let mut background = self.background.chunks_mut(length);
+        let mut effects: Vec<_> = self.effects.iter_mut().map(|plane| plane.chunks_mut(length)).collect();
+        let mut reflection = self.reflection.chunks_mut(length);
+        let mut refraction = self.refraction.chunks_mut(length);
+        let mut normal = self.normal.chunks_mut(length);
+        let mut shadow = self.shadow.chunks_mut(length);
+        let mut depth = self.depth.each_mut().map(|plane| plane.chunks_mut(length));
+        let mut object = self.object.chunks_mut(length);
+        let mut alpha = self.alpha.chunks_mut(length);
+        let mut rows = Vec::with_capacity(bands);
+        for beauty in self.beauty.chunks_mut(length) {
+            rows.push(Rows {
+                beauty,
+                background: background.next().unwrap_or_default(),
+                effects: effects.iter_mut().map(|plane| plane.next().unwrap_or_default()).collect(),
+                reflection: reflection.next().unwrap_or_default(),
+                refraction: refraction.next().unwrap_or_default(),
+                normal: normal.next().unwrap_or_default(),
+                shadow: shadow.next().unwrap_or_default(),
+                depth: depth.each_mut().map(|plane| plane.next().unwrap_or_default()),
+                object: object.next().unwrap_or_default(),
+                alpha: alpha.next().unwrap_or_default(),
+            });
         }
-        for (d, plane) in self.depth.iter_mut().enumerate().skip(1) {
-            let defined: Vec<f32> = samples.iter().map(|s| s.depth[d]).filter(|v| v.is_finite()).collect();
-            if !defined.is_empty() {
-                plane[k] = defined.iter().sum::<f32>() / defined.len() as f32;
-            }
-        }
+        rows
     }
 
     fn into_layers(self, size: [u32; 2], layout: &ChannelLayout, set: &LayerSet) -> Layers {
         let mut layers = Layers { size, ..Layers::default() };
-        let rgb = |at: usize| -> Vec<[f32; 3]> {
-            (0..self.alpha.len()).map(|k| std::array::from_fn(|c| self.values[at + c][k])).collect()
-        };
-        let mut beauty = self.background.clone();
-        for (_, at) in layout.effects() {
-            for (sum, part) in beauty.iter_mut().zip(rgb(at)) {
-                for c in 0..3 {
-                    sum[c] += part[c];
-                }
-            }
-        }
-        for effect in &self.glass {
-            for (sum, part) in beauty.iter_mut().zip(effect) {
-                for c in 0..3 {
-                    sum[c] += part[c];
-                }
-            }
-        }
-        layers.insert("beauty", LayerData::Rgb(beauty));
+        layers.insert("beauty", LayerData::Rgb(self.beauty));
         if set.effects {
-            for (name, effect) in ["reflection", "refraction"].into_iter().zip(self.glass) {
-                if !effect.is_empty() {
-                    layers.insert(name, LayerData::Rgb(effect));
+            for (name, plane) in [("reflection", self.reflection), ("refraction", self.refraction)] {
+                if !plane.is_empty() {
+                    layers.insert(name, LayerData::Rgb(plane));
                 }
             }
-            layers.insert("background", LayerData::Rgb(self.background.clone()));
-            for (name, at) in layout.effects() {
-                layers.insert(name, LayerData::Rgb(rgb(at)));
+            layers.insert("background", LayerData::Rgb(self.background));
+            for ((name, _), plane) in layout.effects().zip(self.effects) {
+                layers.insert(name, LayerData::Rgb(plane));
             }
         }
-        if let Some(at) = layout.normal() {
-            layers.insert("normal", LayerData::Rgb(rgb(at)));
+        if layout.normal().is_some() {
+            layers.insert("normal", LayerData::Rgb(self.normal));
         }
-        if let Some(at) = layout.shadow() {
-            layers.insert("shadow", LayerData::Scalar(self.values[at].clone()));
+        if layout.shadow().is_some() {
+            layers.insert("shadow", LayerData::Scalar(self.shadow));
         }
         if set.depth {
-            let [first, median, mean, sigma] = self.depth;
             for (name, plane) in
-                [("depth.first", first), ("depth.median", median), ("depth.mean", mean), ("depth.sigma", sigma)]
+                ["depth.first", "depth.median", "depth.mean", "depth.sigma"].into_iter().zip(self.depth)
             {
                 layers.insert(name, LayerData::Scalar(plane));
             }
@@ -271,5 +212,203 @@ impl Output {
         }
         layers.insert("alpha", LayerData::Scalar(self.alpha));
         layers
+    }
+}
+
+/// A row of samples, by plane so that loops over it take several at a time.
+struct SampleRow {
+    /// The share of light that passes everything translucent, by colour.
+    transmittance: [Vec<f32>; 3],
+    /// The same where an opaque surface lies straight ahead and is seen, else 0: what its colours are multiplied by.
+    surface: [Vec<f32>; 3],
+    /// Green's where an opaque surface lies straight ahead, seen or not, else 0: for its normal and its shadow. Of what lies
+    /// straight ahead a bent ray shows nothing; what is no light is still told.
+    straight: Vec<f32>,
+    /// The share of the background that is seen, by colour.
+    through: [Vec<f32>; 3],
+    /// One number a sample.
+    values: Vec<f32>,
+}
+
+impl SampleRow {
+    fn new(width: usize) -> Self {
+        let row = || vec![0.0; width];
+        Self {
+            transmittance: std::array::from_fn(|_| row()),
+            surface: std::array::from_fn(|_| row()),
+            straight: row(),
+            through: std::array::from_fn(|_| row()),
+            values: row(),
+        }
+    }
+
+    /// What is seen through in the row whose first sample is `begin`.
+    fn read(&mut self, input: &FinishInput<'_>, begin: usize) {
+        let FinishInput { accumulator, opaque, glass, .. } = input;
+        let planes = accumulator.optical_depth.len();
+        let width = self.values.len();
+        for c in 0..3 {
+            let depths = &accumulator.optical_depth[if planes == 3 { c } else { 0 }][begin..begin + width];
+            for (share, depth) in self.transmittance[c].iter_mut().zip(depths) {
+                *share = exp_neg(*depth);
+            }
+            self.through[c].copy_from_slice(&self.transmittance[c]);
+        }
+        if !opaque.depth.is_empty() {
+            for i in 0..width {
+                let is_solid = opaque.depth[begin + i].is_finite();
+                self.straight[i] = if is_solid { self.transmittance[1][i] } else { 0.0 };
+                for c in 0..3 {
+                    self.surface[c][i] = if is_solid { self.transmittance[c][i] } else { 0.0 };
+                    self.through[c][i] = if is_solid { 0.0 } else { self.transmittance[c][i] };
+                }
+            }
+        }
+        let bent = glass.iter().flat_map(|glass| glass.behind[begin..begin + width].iter().enumerate());
+        for (i, _) in bent.filter(|(_, behind)| !behind[0].is_nan()) {
+            for c in 0..3 {
+                self.surface[c][i] = 0.0;
+            }
+        }
+    }
+
+    /// The numbers of a channel, with those of the surface behind.
+    fn value(&mut self, input: &FinishInput<'_>, begin: usize, channel: usize) -> &[f32] {
+        let FinishInput { accumulator, opaque, layout, .. } = input;
+        let samples = begin..begin + self.values.len();
+        self.values.copy_from_slice(&accumulator.channels[channel][samples.clone()]);
+        if !opaque.depth.is_empty() {
+            let plane = ChannelLayout::plane_of(channel, accumulator.channels.len(), 3);
+            let shares = if channel < layout.colors() { &self.surface[plane] } else { &self.straight };
+            let behind = &opaque.channels[channel][samples];
+            for ((value, share), behind) in self.values.iter_mut().zip(shares).zip(behind) {
+                *value += share * behind;
+            }
+        }
+        &self.values
+    }
+}
+
+/// Adds `share` of each sample to its pixel, as many samples to each.
+fn add<'a>(sums: impl ExactSizeIterator<Item = &'a mut f32>, samples: &[f32], share: f32) {
+    let a_pixel = samples.len() / sums.len();
+    for (sum, samples) in sums.zip(samples.chunks_exact(a_pixel)) {
+        for value in samples {
+            *sum += share * value;
+        }
+    }
+}
+
+impl Rows<'_> {
+    /// Fills row `row` of these, which is row `y` of the picture.
+    fn fill(&mut self, input: &FinishInput<'_>, samples: &mut SampleRow, row: usize, y: usize) {
+        let FinishInput { accumulator, layout, glass, antialias, .. } = *input;
+        let antialias = antialias as usize;
+        let sample_width = accumulator.size[0] as usize;
+        let width = sample_width / antialias;
+        let pixels = row * width..(row + 1) * width;
+        let share = 1.0 / (antialias * antialias) as f32;
+        for sample_row in y * antialias..(y + 1) * antialias {
+            let begin = sample_row * sample_width;
+            samples.read(input, begin);
+            self.see_through(input, samples, pixels.clone(), sample_row, share);
+            for ((_, at), plane) in layout.effects().zip(&mut self.effects) {
+                for c in 0..3 {
+                    let values = samples.value(input, begin, at + c);
+                    add(plane[pixels.clone()].iter_mut().map(|sum| &mut sum[c]), values, share);
+                }
+            }
+            if let Some(at) = layout.normal() {
+                for c in 0..3 {
+                    let values = samples.value(input, begin, at + c);
+                    add(self.normal[pixels.clone()].iter_mut().map(|sum| &mut sum[c]), values, share);
+                }
+            }
+            if let Some(at) = layout.shadow() {
+                add(self.shadow[pixels.clone()].iter_mut(), samples.value(input, begin, at), share);
+            }
+        }
+        for k in pixels {
+            let mut sum = self.background[k];
+            let glass = glass.map(|_| [self.reflection[k], self.refraction[k]]);
+            for part in self.effects.iter().map(|plane| plane[k]).chain(glass.into_iter().flatten()) {
+                for c in 0..3 {
+                    sum[c] += part[c];
+                }
+            }
+            self.beauty[k] = sum;
+            self.tell(input, k, k - row * width, y);
+        }
+    }
+
+    /// Adds what is seen through a row of samples: alpha, the background, and what was mirrored and bent.
+    fn see_through(
+        &mut self,
+        input: &FinishInput<'_>,
+        samples: &mut SampleRow,
+        pixels: Range<usize>,
+        sample_row: usize,
+        share: f32,
+    ) {
+        let [red, green, blue] = &samples.through;
+        for (i, value) in samples.values.iter_mut().enumerate() {
+            *value = 1.0 - (red[i] + green[i] + blue[i]) / 3.0;
+        }
+        add(self.alpha[pixels.clone()].iter_mut(), &samples.values, share);
+        let begin = sample_row * samples.values.len();
+        for i in 0..samples.values.len() {
+            let pixel = pixels.start + i / input.antialias as usize;
+            let through: [f32; 3] = std::array::from_fn(|c| samples.through[c][i]);
+            let bent = input.glass.and_then(|glass| glass.bent(begin + i));
+            // What is hidden is not looked up.
+            if through != [0.0; 3] && bent.is_none() {
+                let behind = input.background.radiance(i as u32, sample_row as u32);
+                for c in 0..3 {
+                    self.background[pixel][c] += share * (through[c] * behind[c]);
+                }
+            }
+            let Some(glass) = input.glass else { continue };
+            for c in 0..3 {
+                self.reflection[pixel][c] += share * glass.mirrored[begin + i][c];
+                let behind = bent.map_or(0.0, |behind| samples.transmittance[c][i] * behind[c]);
+                self.refraction[pixel][c] += share * behind;
+            }
+        }
+    }
+
+    /// Depths and object of pixel `k`, which is pixel (x, y) of the picture.
+    fn tell(&mut self, input: &FinishInput<'_>, k: usize, x: usize, y: usize) {
+        let FinishInput { accumulator, opaque, antialias, .. } = input;
+        let antialias = *antialias as usize;
+        let sample_width = accumulator.size[0] as usize;
+        let samples = (y * antialias..(y + 1) * antialias)
+            .flat_map(|row| (0..antialias).map(move |column| row * sample_width + x * antialias + column));
+        if let Some(object) = self.object.get_mut(k) {
+            let nearest =
+                |k: usize| [&accumulator.object, &opaque.object].into_iter().filter_map(move |ids| ids.get(k));
+            *object = samples.clone().flat_map(nearest).copied().find(|id| *id != u32::MAX).unwrap_or(u32::MAX);
+        }
+        if self.depth[0].is_empty() || accumulator.depth.is_empty() {
+            return;
+        }
+        let plane = accumulator.optical_depth.len() / 2;
+        let mut sums = [0.0; 4];
+        let mut defined = [0u32; 4];
+        for sample in samples {
+            let solid = opaque.depth.get(sample).copied().filter(|depth| depth.is_finite());
+            let depths = accumulator.depth[sample].depths(accumulator.optical_depth[plane][sample], solid);
+            self.depth[0][k] = self.depth[0][k].min(depths[0]);
+            for d in 1..4 {
+                if depths[d].is_finite() {
+                    sums[d] += depths[d];
+                    defined[d] += 1;
+                }
+            }
+        }
+        for d in 1..4 {
+            if defined[d] > 0 {
+                self.depth[d][k] = sums[d] / defined[d] as f32;
+            }
+        }
     }
 }

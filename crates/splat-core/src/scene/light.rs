@@ -7,6 +7,7 @@ mod brightest;
 mod points;
 mod slide;
 
+pub use brightest::LitBounds;
 pub use slide::{Framing, Slide, SlideProjection};
 
 use crate::Error;

@@ -6,7 +6,11 @@ pub use checked::Unfit;
 
 use crate::{Aabb, Error, Gaussians};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 use std::sync::Arc;
+
+/// Splats that a thread bounds at a time.
+const BOUNDED: usize = 1 << 14;
 
 /// What a splat is optically.
 #[repr(u8)]
@@ -264,7 +268,8 @@ impl Cloud {
 
     /// Bounds of the centres, relative to the origin; empty bounds for an empty cloud.
     pub fn bounds(&self) -> Aabb {
-        Aabb::of_points(&self.position)
+        let chunks = self.position.par_chunks(BOUNDED);
+        chunks.map(Aabb::of_points).reduce(|| Aabb::EMPTY, Aabb::union)
     }
 
     /// Multiplies all lengths by `scale`, cross-sections by its square.

@@ -175,7 +175,8 @@ impl FootprintStack {
 
     /// The splats of a cloud that show images, discs of which these are the kinds.
     pub fn images_in<'a>(&'a self, cloud: &'a Cloud) -> impl Iterator<Item = (usize, SplatKind)> + 'a {
-        let splats = cloud.footprint.iter().zip(&cloud.kind).enumerate().filter(|_| self.has_images());
+        let looked_at = if self.has_images() { cloud.len() } else { 0 };
+        let splats = cloud.footprint.iter().zip(&cloud.kind).enumerate().take(looked_at);
         let shown =
             splats.filter(|(_, (id, kind))| **kind != SplatKind::Medium && self.image(usize::from(**id)).is_some());
         shown.map(|(i, (_, kind))| (i, *kind))

@@ -6,7 +6,7 @@ use crate::building::deposit::{Deposit, Ends, Scratch, WIDE};
 use crate::building::media::Target;
 use crate::mapping::{Mapping, with_mapping};
 use crate::planning::lit::{ROUND_COUNT, Rounds};
-use crate::planning::plan::{Plan, plan};
+use crate::planning::plan::{Plan, plan, predict};
 use crate::planning::survey::{CHUNK, Survey};
 use crate::shadow_map::{Absorbances, Matter, head};
 use crate::table::{Lists, Parted, Ranges};
@@ -77,7 +77,7 @@ impl Deposits {
         params.validate()?;
         light.validate(0)?;
         let casters = Casters::new(scene, params);
-        plan(&casters, &Survey::new(&casters), light, &params.limits).map(|plan| plan.prediction)
+        predict(&casters, &Survey::new(&casters), light, &params.limits)
     }
 
     fn with_mapping<M: Mapping>(

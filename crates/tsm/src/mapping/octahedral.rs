@@ -12,6 +12,10 @@
 
 use super::{Crease, Mapping, Place, Ray, View};
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Directions that a thread finds at a time.
+const CHUNK: usize = 1 << 12;
 
 /// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.
 const ATAN: [f32; 8] = [
@@ -46,7 +50,8 @@ impl Octahedral {
         let n = n.clamp(1, 1 << 15);
         let half = n.div_ceil(2);
         let centre = |i: u32| f64::from(2 * (i + n / 2) + 1) / f64::from(n) - 1.0;
-        let quarter = (0..half * half).map(|k| direction([centre(k % half), centre(k / half)])).collect();
+        let places = (0..half * half).into_par_iter().with_min_len(CHUNK);
+        let quarter = places.map(|k| direction([centre(k % half), centre(k / half)])).collect();
         let inverse_measure = (f64::from(n).powi(2) / (4.0 * std::f64::consts::PI)) as f32;
         Self { n, inverse_measure, quarter }
     }

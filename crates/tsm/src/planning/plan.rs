@@ -2,7 +2,7 @@
 
 use crate::building::caster::Casters;
 use crate::frame::{Frame, axes_about, axes_along};
-use crate::mapping::{Mapping, Octahedral, Planar, PolarAzimuth, PolarRange, Table, with_mapping};
+use crate::mapping::{Octahedral, Planar, PolarAzimuth, PolarRange, Table};
 use crate::planning::appearance::{Apparent, Appearance, SECTORS};
 use crate::planning::cost::{self, Limit, Prediction};
 use crate::planning::lit::{LOOK_CELLS, Lit};
@@ -48,8 +48,34 @@ enum Kind {
 /// Cells are numbered with 31 bits, and their columns and rows are found exactly in single precision.
 const MOST_CELLS_OF_A_SIDE: u64 = 1 << 22;
 
-/// Chooses frame, kind and size, of what is predicted to fit `room`.
+/// A mapping that is chosen and not made: its table of directions takes longer than all else that is predicted.
+struct Choice {
+    frame: Frame,
+    extent: Extent,
+    /// The side of a cell.
+    cell: f64,
+    prediction: Prediction,
+    lit: Lit,
+}
+
+/// The cost of what [`plan`] would make.
+pub(crate) fn predict(
+    casters: &Casters<'_>,
+    survey: &Survey,
+    light: &Light,
+    room: &Limits,
+) -> Result<Prediction, Error> {
+    choose(casters, survey, light, room).map(|choice| choice.prediction)
+}
+
+/// Chooses and makes a mapping of what is predicted to fit `room`.
 pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: &Limits) -> Result<Plan, Error> {
+    let Choice { frame, extent, cell, prediction, lit } = choose(casters, survey, light, room)?;
+    Ok(Plan { frame, table: extent.table(cell), prediction, lit })
+}
+
+/// Chooses frame, kind and size.
+fn choose(casters: &Casters<'_>, survey: &Survey, light: &Light, room: &Limits) -> Result<Choice, Error> {
     let (kind, frame) = frame_of(casters, survey, light)?;
     let apparent = match kind {
         Kind::Octahedral => Apparent::Angle,
@@ -58,19 +84,18 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: 
         Kind::Parallel => Apparent::Length,
     };
     let look = Appearance::new(casters, &frame, apparent);
-    let shape = Extent::new(&kind, &look);
-    let lit = Lit::new(casters, survey, &frame, shape.table(shape.side / LOOK_CELLS));
+    let extent = Extent::new(&kind, &look);
+    let lit = Lit::new(casters, survey, &frame, extent.table(extent.side / LOOK_CELLS));
     let (cell, limit) = match casters.params.resolution {
-        Resolution::Auto => automatic_cell(casters, survey, &look, &lit, &shape, room),
-        Resolution::Cells(n) => (shape.side / f64::from(n), Limit::Asked),
+        Resolution::Auto => automatic_cell(casters, survey, &look, &lit, &extent, room),
+        Resolution::Cells(n) => (extent.side / f64::from(n), Limit::Asked),
     };
-    let prediction = cost::predict(&look, survey, &lit, cell, shape.size(cell), limit, shape.is_octahedral());
+    let prediction = cost::predict(&look, survey, &lit, cell, extent.size(cell), limit, extent.is_octahedral());
     let most_bytes = room.max_bytes;
     if prediction.bytes > most_bytes {
         return Err(Error::limit("the table", prediction.bytes, most_bytes, "bytes"));
     }
-    let table = shape.table(cell);
-    let cells = with_mapping!(&table, m => m.size()).map(u64::from);
+    let cells = extent.size(cell).map(|cells| cells as u64);
     for (needed, limit, unit) in [
         (cells[0].max(cells[1]), MOST_CELLS_OF_A_SIDE, "cells along a side"),
         (cells[0].saturating_mul(cells[1]), i32::MAX as u64, "cells"),
@@ -79,7 +104,7 @@ pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: 
             return Err(Error::limit("the table", needed, limit, unit));
         }
     }
-    Ok(Plan { frame, table, prediction, lit })
+    Ok(Choice { frame, extent, cell, prediction, lit })
 }
 
 fn frame_of(casters: &Casters<'_>, survey: &Survey, light: &Light) -> Result<(Kind, Frame), Error> {

@@ -3,25 +3,45 @@
 use super::Light;
 use crate::{Cloud, DAabb};
 use glam::DVec3;
+use rayon::prelude::*;
+
+/// Splats that a thread looks at, at a time.
+const CHUNK: usize = 1 << 14;
 
 /// Standard deviation of a splat over its radius, at least.
 const LEAST_DEVIATION: f64 = 0.25;
 
-impl Light {
-    /// The most light that any splat of a cloud could receive without shadows, in the channel that has most, W/m²: at the place
-    /// of the bounds of their centres that is nearest to the light, by the least radius. Infinite where a splat without extent
-    /// could lie at the light.
-    pub fn brightest_on(&self, cloud: &Cloud) -> f64 {
+/// How near any splat of a cloud can be to a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LitBounds {
+    /// Where centres lie, relative to the cloud's origin, so that a moved scene has the same bits; `None` of a cloud without splats.
+    centers: Option<DAabb>,
+    origin: DVec3,
+    /// The least standard deviation.
+    spread: f64,
+}
+
+impl LitBounds {
+    /// Those of the splats of a cloud.
+    pub fn new(cloud: &Cloud) -> Self {
         let bounds = cloud.bounds();
-        if bounds.is_empty() {
-            return self.greatest_intensity();
-        }
-        let bounds = DAabb::new(bounds.min.as_dvec3(), bounds.max.as_dvec3());
-        let least = cloud.radius.iter().copied().fold(f32::INFINITY, f32::min);
-        // Relative to the cloud's origin, so that a moved scene has the same bits.
-        self.brightest_in(&bounds, cloud.origin, LEAST_DEVIATION * f64::from(least))
+        let centers = (!bounds.is_empty()).then(|| DAabb::new(bounds.min.as_dvec3(), bounds.max.as_dvec3()));
+        let least = |radii: &[f32]| radii.iter().copied().fold(f32::INFINITY, f32::min);
+        let least = cloud.radius.par_chunks(CHUNK).map(least).reduce(|| f32::INFINITY, f32::min);
+        Self { centers, origin: cloud.origin, spread: LEAST_DEVIATION * f64::from(least) }
     }
 
+    /// The most light of a lamp that any of the splats could receive without shadows, in the channel that has most, W/m²: at the place of the bounds of
+    /// their centres that is nearest to it, by the least radius. Infinite where a splat without extent could lie at the light.
+    pub fn brightest_of(&self, light: &Light) -> f64 {
+        self.centers.map_or_else(
+            || light.greatest_intensity(),
+            |centers| light.brightest_in(&centers, self.origin, self.spread),
+        )
+    }
+}
+
+impl Light {
     /// The most light that a point in `bounds`, which lie relative to `origin`, could receive without shadows as 1/(d² + `spread`²), in the channel
     /// that has most, W/m². Infinite where the light may lie at such a point and `spread` is 0.
     pub fn brightest_in(&self, bounds: &DAabb, origin: DVec3, spread: f64) -> f64 {
