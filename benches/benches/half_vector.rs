@@ -1,5 +1,6 @@
 //! Half-vector sheets of a procedural cloud at 400², the sun before and behind it: without light, with shadows, scattered ahead,
-//! back and forth, and under a disk in one sweep; beside image-aligned sheets without light.
+//! back and forth, and under a disk in one sweep; beside image-aligned sheets without light. Each by splatted sheets and by
+//! gathered ones, with the Gaussian kernel and with the linear one.
 //!
 //! A plain table of minima, as that of `sheets`: by the clock and in processor time of all threads. `-- head` draws the translucent head
 //! of `sheets` instead, `-- dense` or `-- FILE` other volumes as the head, which `benches/peers/vtk_scattering.py` draws too.
@@ -8,7 +9,7 @@
 use convert::{CloudShape, SplatParams, procedural_cloud};
 use organza_benches::{HeadLike, processor_ms, record};
 use sheet_light::half::{Extended, HalfInput, HalfParams, Scattering, fold};
-use sheet_light::{Params, SheetInput, Volume, prepare};
+use sheet_light::{GatherKernel, Params, Reconstruction, SheetInput, Volume, prepare};
 use splat_core::glam::DVec3;
 use splat_core::shade::{ChannelLayout, LitBy};
 use splat_core::{
@@ -23,8 +24,15 @@ const REPEATS: usize = 5;
 
 const SIZE: [u32; 2] = [400, 400];
 
+/// How sheets get their values, and what stands before the names of rows.
+const RECONSTRUCTIONS: [(&str, Reconstruction); 3] = [
+    ("", Reconstruction::Splat),
+    ("Gaussian: ", Reconstruction::Gather(GatherKernel::Gaussian)),
+    ("linear: ", Reconstruction::Gather(GatherKernel::Linear)),
+];
+
 fn main() {
-    println!("{:>24} {:>8} {:>10} {:>10} {:>10} {:>10}", "ms", "clock", "processor", "M visible", "M eye", "M light");
+    println!("{:>34} {:>8} {:>10} {:>10} {:>10} {:>10}", "ms", "clock", "processor", "M visible", "M eye", "M light");
     match std::env::args().skip(1).find(|a| !a.starts_with('-')) {
         Some(volume) => {
             let like = HeadLike::new(Some(volume.as_str()).filter(|&v| v != "head"));
@@ -47,16 +55,19 @@ fn main() {
 /// All rows of a volume; with `disk` also those under a disk, whose place and size are those of the cloud.
 fn rows(setting: &Setting<'_>, disk: bool) {
     println!("{:?} = {:.2} M voxels", setting.grid.dims, setting.grid.values.len() as f64 * 1e-6);
-    across_the_view(setting);
-    half_vectors("without light", setting, None, Scattering::None);
-    for (from, direction) in [("before", setting.suns[0]), ("behind", setting.suns[1])] {
-        for (how, scattering) in
-            [("shadow", Scattering::None), ("ahead", Scattering::Forward), ("back", Scattering::ForwardAndBack)]
-        {
-            half_vectors(&format!("{how}, sun {from}"), setting, Some(direction), scattering);
-        }
-        if disk {
-            soft(&format!("soft, disk {from}"), setting, direction);
+    for (form, reconstruction) in RECONSTRUCTIONS {
+        let sheets = Params { reconstruction, ..Params::default() };
+        across_the_view(&format!("{form}across the view"), setting, &sheets);
+        half_vectors(&format!("{form}without light"), setting, &sheets, None, Scattering::None);
+        for (from, direction) in [("before", setting.suns[0]), ("behind", setting.suns[1])] {
+            for (how, scattering) in
+                [("shadow", Scattering::None), ("ahead", Scattering::Forward), ("back", Scattering::ForwardAndBack)]
+            {
+                half_vectors(&format!("{form}{how}, sun {from}"), setting, &sheets, Some(direction), scattering);
+            }
+            if disk {
+                soft(&format!("{form}soft, disk {from}"), setting, &sheets, direction);
+            }
         }
     }
 }
@@ -130,51 +141,45 @@ fn ran<T>(mut run: impl FnMut() -> T) -> Ran<T> {
     }
 }
 
-fn across_the_view(setting: &Setting<'_>) {
+fn across_the_view(name: &str, setting: &Setting<'_>, sheets: &Params) {
     let material = material(Shading::Unlit);
     let layout = ChannelLayout::new(&LayerSet::default());
     let ran = ran(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
         let input = setting.input(&material, Vec::new());
-        let sheeted = prepare(input, &Params::default(), None).expect("it can be drawn");
+        let sheeted = prepare(input, sheets, None).expect("it can be drawn");
         sheeted.fold(f32::NEG_INFINITY..f32::INFINITY, &[], &layout, &mut out, None).expect("nobody cancels")
     });
-    row(setting, "across the view", &ran, |c| [c.visible, c.fragments, 0]);
+    row(setting, name, &ran, |c| [c.visible, c.fragments, 0]);
 }
 
-fn half_vectors(name: &str, setting: &Setting<'_>, direction: Option<DVec3>, scattering: Scattering) {
+fn half_vectors(name: &str, setting: &Setting<'_>, sheets: &Params, direction: Option<DVec3>, scattering: Scattering) {
     let material = material(if direction.is_some() { Shading::Phase } else { Shading::Unlit });
     let sun = |d: DVec3| {
         let shape = LightShape::Directional { direction: d.normalize() };
         LitBy { slide: None, light: Light { shape, intensity: [3.0; 3] }, shadow: None }
     };
-    let sheets = setting.input(&material, direction.map(sun).into_iter().collect());
-    sweep(name, setting, sheets, Vec::new(), scattering);
+    let input = setting.input(&material, direction.map(sun).into_iter().collect());
+    sweep(name, setting, input, Vec::new(), &HalfParams { scattering, sheets: *sheets, ..HalfParams::default() });
 }
 
 /// Sixteen points of a disk as wide as the cloud is high, in one sweep.
-fn soft(name: &str, setting: &Setting<'_>, direction: DVec3) {
+fn soft(name: &str, setting: &Setting<'_>, sheets: &Params, direction: DVec3) {
     let material = material(Shading::Phase);
     let normal = direction.normalize();
     let shape = LightShape::Disk { center: DVec3::Y * 0.5 - normal * 10.0, normal, radius: 0.6 };
     let lit = LitBy { slide: None, light: Light { shape, intensity: [300.0; 3] }, shadow: None };
     let extended = vec![Extended { lit, samples: 16 }];
-    sweep(name, setting, setting.input(&material, Vec::new()), extended, Scattering::None);
+    let params = HalfParams { scattering: Scattering::None, sheets: *sheets, ..HalfParams::default() };
+    sweep(name, setting, setting.input(&material, Vec::new()), extended, &params);
 }
 
-fn sweep(
-    name: &str,
-    setting: &Setting<'_>,
-    sheets: SheetInput<'_>,
-    extended: Vec<Extended<'_>>,
-    scattering: Scattering,
-) {
+fn sweep(name: &str, setting: &Setting<'_>, sheets: SheetInput<'_>, extended: Vec<Extended<'_>>, params: &HalfParams) {
     let input = HalfInput { sheets, splats: None, polygons: &[], extended, mapped: Vec::new(), opaque: &[] };
-    let params = HalfParams { scattering, ..HalfParams::default() };
     let layout = ChannelLayout::new(&LayerSet::default());
     let ran = ran(|| {
         let mut out = Accumulator::new(SIZE, 1, 3, false, false);
-        fold(&input, &params, &layout, &mut out, None).expect("half vectors serve it").counts
+        fold(&input, params, &layout, &mut out, None).expect("half vectors serve it").counts
     });
     row(setting, name, &ran, |c| [c.visible, c.eye_fragments, c.light_fragments]);
 }
@@ -184,5 +189,5 @@ fn row<T>(setting: &Setting<'_>, name: &str, ran: &Ran<T>, counts: impl Fn(&T) -
     record(&format!("half_vector/{}, {name}", setting.name), &ran.clock, counts[0]);
     let [visible, eye, light] = counts.map(|n| n as f64 * 1e-6);
     let least = ran.clock.iter().copied().fold(f64::INFINITY, f64::min);
-    println!("{name:>24} {least:8.0} {:10.0} {visible:10.2} {eye:10.1} {light:10.1}", ran.processor);
+    println!("{name:>34} {least:8.0} {:10.0} {visible:10.2} {eye:10.1} {light:10.1}", ran.processor);
 }

@@ -74,9 +74,9 @@ pub(crate) fn rounded(number: f32) -> u8 {
     (number * f32::from(WHITE) + 0.5) as u8
 }
 
-/// Before the curve: its power is undefined below 0. `NaN.max(0)` is 0, where `NaN.clamp` would stay NaN, and −0 + 0 has no sign.
+/// Before the curve: its power is undefined below 0. What is no number is 0, too, and 0 has no sign.
 fn clamped(linear: f32) -> f32 {
-    linear.max(0.0).min(1.0) + 0.0
+    if linear > 0.0 { linear.min(1.0) } else { 0.0 }
 }
 
 #[cfg(test)]
