@@ -4,17 +4,17 @@ use std::sync::LazyLock;
 
 /// The last byte.
 const WHITE: u8 = 255;
-/// Bits of a radiance that do not tell a bucket: one has the radiances that are alike in exponent and seven bits behind it, and at most two bytes begin in
-/// it.
+/// Low bits of a radiance that a bucket ignores. A bucket holds the radiances with the same exponent and the same seven leading bits of the mantissa, so
+/// at most two bytes begin in it.
 const IGNORED: u32 = 16;
-/// Buckets of radiances from 0 to 1.
+/// Number of buckets for radiances from 0 to 1.
 const BUCKETS: usize = (1.0f32.to_bits() >> IGNORED) as usize + 1;
 
-/// The byte of each radiance: a power is taken for each byte once, not for each channel of each pixel.
+/// The table from radiances to bytes. It replaces a power per channel and pixel.
 struct Bytes {
-    /// The least radiance of each byte.
+    /// The least radiance that each byte displays.
     least: [f32; WHITE as usize + 1],
-    /// The byte of the least radiance of each bucket.
+    /// The byte of the least radiance in each bucket.
     first: [u8; BUCKETS],
 }
 
@@ -25,7 +25,7 @@ impl Bytes {
         let mut bytes = Box::new(Self { least: [0.0; WHITE as usize + 1], first: [0; BUCKETS] });
         let mut low = 0u32;
         for byte in 1..=WHITE {
-            // Radiances of 0 to 1 are in the order of their bits.
+            // Bisects the bits, because radiances from 0 to 1 have the order of their bits.
             let mut high = 1.0f32.to_bits();
             while high - low > 1 {
                 let middle = low + (high - low) / 2;
@@ -43,7 +43,7 @@ impl Bytes {
         bytes
     }
 
-    /// The byte of a radiance from 0 to 1.
+    /// Returns the byte that displays a radiance from 0 to 1.
     fn byte(&self, radiance: f32) -> u8 {
         let mut byte = self.first[(radiance.to_bits() >> IGNORED) as usize];
         while byte < WHITE && radiance >= self.least[usize::from(byte) + 1] {
@@ -64,7 +64,7 @@ pub fn displayed(linear: f32) -> u8 {
     BYTES.byte(clamped(linear))
 }
 
-/// The same as a number from 0 to 1.
+/// The byte of [`displayed`] as a number from 0 to 1.
 pub(crate) fn stepped(linear: f32) -> f32 {
     f32::from(displayed(linear)) / f32::from(WHITE)
 }
@@ -74,7 +74,7 @@ pub(crate) fn rounded(number: f32) -> u8 {
     (number * f32::from(WHITE) + 0.5) as u8
 }
 
-/// Before the curve: its power is undefined below 0. What is no number is 0, too, and 0 has no sign.
+/// Clamps a radiance to 0 to 1 before the curve, whose power is undefined below 0. NaN and −0 become 0.
 fn clamped(linear: f32) -> f32 {
     if linear > 0.0 { linear.min(1.0) } else { 0.0 }
 }
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_byte_is_that_of_the_curve() {
-        // Every 97th of all radiances from 0 to beyond 1, and all about each place where a byte begins.
+        // Every 97th float from 0 to above 1, and every float near the radiances where a byte begins.
         let even = (0..1.01f32.to_bits()).step_by(97);
         let about = |least: f32| least.to_bits().saturating_sub(300)..least.to_bits() + 300;
         for bits in even.chain(BYTES.least.into_iter().flat_map(about)) {

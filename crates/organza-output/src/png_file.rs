@@ -6,7 +6,7 @@ use crate::display::{encoded, rounded, stepped};
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, SrgbRenderingIntent};
 use splat_core::Layers;
 
-/// Linear radiance → a displayed number, 0 to 1.
+/// A function from linear radiance to a displayed value, 0 to 1.
 type Curve = fn(f32) -> f32;
 
 /// The bytes of the PNG file.
@@ -36,7 +36,7 @@ pub(super) fn bytes(
     Ok(quantized(&samples(layers, metadata, params, BitDepth::Eight, report)?, BitDepth::Eight))
 }
 
-/// The displayed picture with its legends, 0 to 1, as exact as this depth shows.
+/// Returns the displayed picture with its legends, values from 0 to 1. With 8 bits the values are whole bytes.
 fn samples(
     layers: &Layers,
     metadata: &Metadata,
@@ -71,7 +71,7 @@ fn written(
     let mut encoder = Encoder::new(bytes, width, height);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    // A fifth of the time of the usual one, which is longer than that of drawing a preview.
+    // `Balanced` takes longer than a coarse picture of a view: 45 to 98 ms at 960x540, where `Fast` takes 3 ms for files 10 to 25 % larger.
     encoder.set_compression(Compression::Fast);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     for (name, text) in texts::pairs(metadata) {

@@ -126,15 +126,15 @@ pub(crate) fn eye_params(loaded: &Loaded, tolerance: f32, max_bytes: u64) -> Par
     Params { tolerance, footprints, refines_lit: false, limits: Limits::bytes(max_bytes), ..Params::default() }
 }
 
-/// Greatest optical depth of a spacing among the media of each object of a loaded scene.
-fn thickest_of_objects(loaded: &Loaded) -> Vec<f32> {
+/// Returns the greatest optical depth per spacing in the media of each object.
+fn thickest_by_object(loaded: &Loaded) -> Vec<f32> {
     let meet = |thickest: &mut f32, i: usize| *thickest = thickest.max(thickness_of(loaded, i));
     by_object(&loaded.cloud, loaded.objects.len(), &0.0, meet, |thickest, other| *thickest = thickest.max(*other))
 }
 
-/// The greatest of all objects; 0 where media are thin everywhere.
-fn thickest(of_objects: &[f32]) -> f64 {
-    let thickest = of_objects.iter().copied().fold(0.0, f32::max);
+/// Returns the greatest optical depth per spacing in the scene; 0 if all media are thin.
+fn thickest(by_object: &[f32]) -> f64 {
+    let thickest = by_object.iter().copied().fold(0.0, f32::max);
     if thickest > SEEN { f64::from(thickest) } else { 0.0 }
 }
 
@@ -158,13 +158,14 @@ pub(crate) fn eye(camera: &Camera) -> Light {
 /// The objects that the eye's map is of: those that are `shown` with media whose spacing is optically thick. What else there is hides a thick cell as
 /// a whole.
 pub(crate) fn thick_objects(loaded: &Loaded, shown: &[bool]) -> Vec<Object> {
-    thicker_than_seen(loaded, &thickest_of_objects(loaded), shown)
+    thicker_than_seen(loaded, &thickest_by_object(loaded), shown)
 }
 
-fn thicker_than_seen(loaded: &Loaded, thickest: &[f32], shown: &[bool]) -> Vec<Object> {
-    let objects = loaded.objects.iter().zip(thickest).zip(shown);
+/// Returns all objects. Those cast a shadow which are `shown` and whose `thickness` exceeds [`SEEN`].
+fn thicker_than_seen(loaded: &Loaded, thickness: &[f32], shown: &[bool]) -> Vec<Object> {
+    let objects = loaded.objects.iter().zip(thickness).zip(shown);
     objects
-        .map(|((object, thickest), shown)| Object { casts_shadow: *shown && *thickest > SEEN, ..object.clone() })
+        .map(|((object, thickness), shown)| Object { casts_shadow: *shown && *thickness > SEEN, ..object.clone() })
         .collect()
 }
 
@@ -180,17 +181,17 @@ pub(crate) fn eye_table(
     max_bytes: u64,
 ) -> Result<Option<ShadowTable>, Error> {
     let cloud = &loaded.cloud;
-    let of_objects = thickest_of_objects(loaded);
+    let thickness = thickest_by_object(loaded);
     let is_lit_within = |object: usize| {
-        draws[object] && shown[object] && loaded.objects[object].shadow_coefficient > 0.0 && of_objects[object] > SEEN
+        draws[object] && shown[object] && loaded.objects[object].shadow_coefficient > 0.0 && thickness[object] > SEEN
     };
     if !(0..loaded.objects.len()).any(is_lit_within) {
         return Ok(None);
     }
     let tolerance =
-        libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(&of_objects)).max(f64::from(f32::MIN_POSITIVE)) as f32;
+        libm::exp(-f64::from(HIDDEN) - CELLS_BEHIND * thickest(&thickness)).max(f64::from(f32::MIN_POSITIVE)) as f32;
     let params = eye_params(loaded, tolerance, max_bytes);
-    let objects = thicker_than_seen(loaded, &of_objects, shown);
+    let objects = thicker_than_seen(loaded, &thickness, shown);
     let scene = tsm::Scene { cloud, materials: &loaded.materials, objects: &objects };
     let predicted = Deposits::predict(&scene, &eye(&loaded.camera), &params).map_err(|e| shadow_error(EYE, &e))?;
     Ok(Some(ShadowTable {
@@ -273,7 +274,7 @@ fn tables_within(
     max_bytes: u64,
 ) -> Result<Vec<Option<ShadowTable>>, Error> {
     let maps = requests.iter().flatten().count().max(1) as u64;
-    let thickest = thickest(&thickest_of_objects(loaded));
+    let thickest = thickest(&thickest_by_object(loaded));
     let lit = LitBounds::new(&loaded.cloud);
     let table = |request: &Option<MapRequest<'_>>| {
         let Some((point, objects)) = request else { return Ok(None) };

@@ -158,9 +158,9 @@ impl Thickness {
 
     fn join(&mut self, other: &Self) {
         self.bounds = self.bounds.union(other.bounds);
-        // Of splats that are alike the narrowest, whichever is met first.
-        let is_alike = other.optical_depth == self.optical_depth;
-        if other.optical_depth > self.optical_depth || is_alike && other.spacing < self.spacing {
+        // Equal optical depths take the narrower spacing, so that the order of threads does not matter.
+        let is_equal = other.optical_depth == self.optical_depth;
+        if other.optical_depth > self.optical_depth || is_equal && other.spacing < self.spacing {
             self.optical_depth = other.optical_depth;
             self.spacing = other.spacing;
         }

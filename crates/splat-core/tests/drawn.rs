@@ -8,7 +8,9 @@ use splat_core::raster::{
     project, tile_bytes,
 };
 use splat_core::shade::{Census, ChannelLayout};
-use splat_core::{Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, Gaussians, LayerSet, Material};
+use splat_core::{
+    Accumulator, Camera, Cloud, Direction, Footprint, FootprintStack, Gaussians, LayerData, LayerSet, Material,
+};
 use splat_core::{Object, Projection, Shading, Splat, SplatKind};
 use std::sync::Arc;
 
@@ -180,33 +182,59 @@ fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
     // Rows of more than one band, the last not whole; four samples a pixel.
     let width = 3;
     let height = 40;
-    let mut acc = Accumulator::new([2 * width, 2 * height], 1, 3, false, false);
+    let layers = LayerSet { normal: true, shadow: true, object: true, ..LayerSet::default() };
+    let layout = ChannelLayout::new(&layers);
+    let mut acc = Accumulator::new([2 * width, 2 * height], 1, layout.count(), false, true);
     let mut glass = GlassImage::new(acc.size);
     let samples = acc.optical_depth[0].len();
+    let mut opaque = OpaqueImage {
+        depth: vec![f32::INFINITY; samples],
+        channels: vec![vec![0.0; samples]; layout.count()],
+        object: vec![u32::MAX; samples],
+    };
     let at = |k: usize, seed: f32| (k as f32 * seed).fract();
+    let is_bent = |k: usize| k.is_multiple_of(3);
+    let is_solid = |k: usize| k.is_multiple_of(5);
     for k in 0..samples {
         acc.optical_depth[0][k] = at(k, 0.618);
-        (0..3).for_each(|c| acc.channels[c][k] = at(k, 0.414 + 0.1 * c as f32));
+        (0..layout.count()).for_each(|c| acc.channels[c][k] = at(k, 0.414 + 0.1 * c as f32));
         glass.mirrored[k] = [at(k, 0.732), at(k, 0.236), 0.0];
-        // Every third sample sees something else than what lies straight ahead.
-        if k.is_multiple_of(3) {
+        if is_bent(k) {
             glass.behind[k] = [1.0, at(k, 0.873), 0.5];
         }
+        if is_solid(k) {
+            opaque.depth[k] = 2.0;
+            opaque.object[k] = 7;
+            (0..layout.count()).for_each(|c| opaque.channels[c][k] = at(k, 0.314 + 0.1 * c as f32));
+        }
+        if k.is_multiple_of(11) {
+            acc.object[k] = 2;
+        }
     }
-    let layers = LayerSet::default();
+    // Infinite radiance: of a surface that splats hide, and of one that a bent ray passes by.
+    let hidden = 25;
+    acc.optical_depth[0][hidden] = 1e9;
+    let passed = 45;
+    for c in 0..3 {
+        opaque.channels[c][hidden] = f32::INFINITY;
+        opaque.channels[c][passed] = f32::INFINITY;
+    }
     let background = [0.25, 0.5, 1.0];
     let found = finish(&FinishInput {
         accumulator: &acc,
-        opaque: &OpaqueImage::default(),
+        opaque: &opaque,
         background: Background::Color(background),
         glass: Some(&glass),
-        layout: &ChannelLayout::new(&layers),
+        layout: &layout,
         layers: &layers,
         antialias: 2,
     });
     assert_eq!(found.size, [width, height]);
     let beauty = found.rgb("beauty").unwrap();
     let alpha = found.scalar("alpha").unwrap();
+    let normal = found.rgb("normal").unwrap();
+    let shadow = found.scalar("shadow").unwrap();
+    let Some(LayerData::Id(objects)) = found.images.get("object") else { panic!("ids") };
     assert_eq!((beauty.len(), alpha.len()), (120, 120));
     for y in 0..height {
         for x in 0..width {
@@ -214,12 +242,24 @@ fn a_pixel_is_the_mean_of_its_samples_in_every_band_of_rows() {
             let four = [0, 1, 2, 3].map(|s| ((2 * y + s / 2) * 2 * width + 2 * x + s % 2) as usize);
             let mean = |value: &dyn Fn(usize) -> f32| four.iter().map(|&k| value(k)).sum::<f32>() / 4.0;
             let through = |k: usize| (-acc.optical_depth[0][k]).exp();
-            assert!((alpha[pixel] - mean(&|k| 1.0 - through(k))).abs() < 1e-6, "{x} {y}");
+            let seen = |k: usize, c: usize| if through(k) > 0.0 { through(k) * opaque.channels[c][k] } else { 0.0 };
+            let told = |c: usize| mean(&|k| acc.channels[c][k] + if is_solid(k) { seen(k, c) } else { 0.0 });
+            let expected = mean(&|k| if is_solid(k) { 1.0 } else { 1.0 - through(k) });
+            assert!((alpha[pixel] - expected).abs() < 1e-6, "{x} {y}");
             for c in 0..3 {
-                let behind = |k: usize| if k.is_multiple_of(3) { glass.behind[k][c] } else { background[c] };
-                let expected = mean(&|k| acc.channels[c][k] + glass.mirrored[k][c] + through(k) * behind(k));
+                let behind = |k: usize| match (is_bent(k), is_solid(k)) {
+                    (true, _) => through(k) * glass.behind[k][c],
+                    (false, true) => seen(k, c),
+                    (false, false) => through(k) * background[c],
+                };
+                let expected = mean(&|k| acc.channels[c][k] + glass.mirrored[k][c] + behind(k));
                 assert!((beauty[pixel][c] - expected).abs() < 2e-6, "{x} {y} {c}: {} {expected}", beauty[pixel][c]);
+                assert!((normal[pixel][c] - told(3 + c)).abs() < 1e-6, "{x} {y} {c}");
             }
+            assert!((shadow[pixel] - told(6)).abs() < 1e-6, "{x} {y}");
+            let nearest = |k: usize| if acc.object[k] == u32::MAX { opaque.object[k] } else { acc.object[k] };
+            let object = four.iter().map(|&k| nearest(k)).find(|id| *id != u32::MAX);
+            assert_eq!(objects[pixel], object.unwrap_or(u32::MAX), "{x} {y}");
         }
     }
 }

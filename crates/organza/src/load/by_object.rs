@@ -1,13 +1,13 @@
-//! Facts of objects that all their splats have together.
+//! Reduces the splats of each object to one value per object, in parallel.
 
 use rayon::prelude::*;
 use splat_core::Cloud;
 
-/// Splats that one thread looks at before it helps another: to join what is known of a thousand objects takes less time than so many.
+/// Splats per task. Joining the values of a thousand objects takes less time than this many splats.
 const CHUNK: usize = 1 << 14;
 
-/// What is known of each of so many objects, of which `nothing` is known at first: `meet` adds the splat of this number to its object, `join` what another
-/// thread knows of that object. Neither may depend on the order of splats.
+/// Returns one value per object, which starts as `nothing`. `meet` adds the splat with the given index to the value of its object. `join` merges the values
+/// of one object from two threads. The results of both must not depend on the order of the splats, because that of the tasks varies.
 pub(crate) fn by_object<T: Clone + Send + Sync>(
     cloud: &Cloud,
     objects: usize,
@@ -15,18 +15,18 @@ pub(crate) fn by_object<T: Clone + Send + Sync>(
     meet: impl Fn(&mut T, usize) + Sync,
     join: impl Fn(&mut T, &T) + Sync,
 ) -> Vec<T> {
-    let none = || vec![nothing.clone(); objects];
-    let with = |mut known: Vec<T>, chunk: usize| {
+    let start = || vec![nothing.clone(); objects];
+    let meet_chunk = |mut known: Vec<T>, chunk: usize| {
         let first = chunk * CHUNK;
         let objects = &cloud.object[first..cloud.len().min(first + CHUNK)];
         objects.iter().zip(first..).for_each(|(object, i)| meet(&mut known[*object as usize], i));
         known
     };
-    let joined = |mut known: Vec<T>, others: Vec<T>| {
+    let join_values = |mut known: Vec<T>, others: Vec<T>| {
         known.iter_mut().zip(&others).for_each(|(known, other)| join(known, other));
         known
     };
-    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().fold(none, with).reduce(none, joined)
+    (0..cloud.len().div_ceil(CHUNK)).into_par_iter().fold(start, meet_chunk).reduce(start, join_values)
 }
 
 #[cfg(test)]

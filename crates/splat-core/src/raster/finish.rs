@@ -102,12 +102,14 @@ pub fn finish(input: &FinishInput<'_>) -> Layers {
     planes.into_layers(size, layout, layers)
 }
 
-/// The planes of a picture; those that are not asked for are empty.
+/// The layers of a picture while they are filled. Beauty is the sum of background, effects, reflection and refraction, so these exist even if no layer shows
+/// them. Other planes are empty unless the layout or the layer set requests them.
 struct Planes {
     beauty: Vec<[f32; 3]>,
     background: Vec<[f32; 3]>,
-    /// One for each of [`ChannelLayout::effects`].
+    /// One plane per entry of [`ChannelLayout::effects`].
     effects: Vec<Vec<[f32; 3]>>,
+    /// Empty without glass, as `refraction`.
     reflection: Vec<[f32; 3]>,
     refraction: Vec<[f32; 3]>,
     normal: Vec<[f32; 3]>,
@@ -117,7 +119,7 @@ struct Planes {
     alpha: Vec<f32>,
 }
 
-/// The same planes over some rows of the picture.
+/// The planes of a band of rows, which one task fills.
 struct Rows<'a> {
     beauty: &'a mut [[f32; 3]],
     background: &'a mut [[f32; 3]],
@@ -132,7 +134,7 @@ struct Rows<'a> {
 }
 
 impl Planes {
-    /// Nothing seen.
+    /// Allocates planes in which nothing is seen.
     fn new(pixels: usize, input: &FinishInput<'_>) -> Self {
         let FinishInput { layout, layers, glass, .. } = input;
         let colors = |asked: bool| if asked { vec![[0.0; 3]; pixels] } else { Vec::new() };
@@ -150,7 +152,7 @@ impl Planes {
         }
     }
 
-    /// Bands of `length` pixels, the last of what is left.
+    /// Splits the planes into bands of `length` pixels; the last band may be shorter.
     fn bands(&mut self, length: usize) -> Vec<Rows<'_>> {
         let bands = self.beauty.len().div_ceil(length);
         let mut background = self.background.chunks_mut(length);
@@ -215,18 +217,18 @@ impl Planes {
     }
 }
 
-/// A row of samples, by plane so that loops over it take several at a time.
+/// One row of samples, stored by plane so that its loops vectorise.
 struct SampleRow {
-    /// The share of light that passes everything translucent, by colour.
+    /// Transmittance of all translucent splats, by colour.
     transmittance: [Vec<f32>; 3],
-    /// The same where an opaque surface lies straight ahead and is seen, else 0: what its colours are multiplied by.
+    /// Weight of the opaque surface's colours: `transmittance`, or 0 without a surface and where the ray is bent away from it.
     surface: [Vec<f32>; 3],
-    /// Green's where an opaque surface lies straight ahead, seen or not, else 0: for its normal and its shadow. Of what lies
-    /// straight ahead a bent ray shows nothing; what is no light is still told.
+    /// Weight of the opaque surface's normal and shadow: green's transmittance, or 0 without a surface. A bent ray keeps this weight, because normal and
+    /// shadow describe the surface straight ahead.
     straight: Vec<f32>,
-    /// The share of the background that is seen, by colour.
+    /// Weight of the background, by colour: `transmittance`, or 0 behind an opaque surface.
     through: [Vec<f32>; 3],
-    /// One number a sample.
+    /// Scratch: the values of one channel, or the alpha.
     values: Vec<f32>,
 }
 
@@ -242,7 +244,7 @@ impl SampleRow {
         }
     }
 
-    /// What is seen through in the row whose first sample is `begin`.
+    /// Computes the weights of the row whose first sample is `begin`.
     fn read(&mut self, input: &FinishInput<'_>, begin: usize) {
         let FinishInput { accumulator, opaque, glass, .. } = input;
         let planes = accumulator.optical_depth.len();
@@ -272,8 +274,8 @@ impl SampleRow {
         }
     }
 
-    /// The numbers of a channel, with those of the surface behind.
-    fn value(&mut self, input: &FinishInput<'_>, begin: usize, channel: usize) -> &[f32] {
+    /// Returns the values of a channel: the composited splats plus the weighted opaque surface behind them.
+    fn channel(&mut self, input: &FinishInput<'_>, begin: usize, channel: usize) -> &[f32] {
         let FinishInput { accumulator, opaque, layout, .. } = input;
         let samples = begin..begin + self.values.len();
         self.values.copy_from_slice(&accumulator.channels[channel][samples.clone()]);
@@ -282,14 +284,15 @@ impl SampleRow {
             let shares = if channel < layout.colors() { &self.surface[plane] } else { &self.straight };
             let behind = &opaque.channels[channel][samples];
             for ((value, share), behind) in self.values.iter_mut().zip(shares).zip(behind) {
-                *value += share * behind;
+                // Even an infinite radiance adds nothing where its weight is 0.
+                *value += if *share > 0.0 { share * behind } else { 0.0 };
             }
         }
         &self.values
     }
 }
 
-/// Adds `share` of each sample to its pixel, as many samples to each.
+/// Adds `share` times each sample to its pixel. Every pixel has the same number of consecutive samples.
 fn add<'a>(sums: impl ExactSizeIterator<Item = &'a mut f32>, samples: &[f32], share: f32) {
     let a_pixel = samples.len() / sums.len();
     for (sum, samples) in sums.zip(samples.chunks_exact(a_pixel)) {
@@ -300,7 +303,7 @@ fn add<'a>(sums: impl ExactSizeIterator<Item = &'a mut f32>, samples: &[f32], sh
 }
 
 impl Rows<'_> {
-    /// Fills row `row` of these, which is row `y` of the picture.
+    /// Fills row `row` of this band, which is row `y` of the picture.
     fn fill(&mut self, input: &FinishInput<'_>, samples: &mut SampleRow, row: usize, y: usize) {
         let FinishInput { accumulator, layout, glass, antialias, .. } = *input;
         let antialias = antialias as usize;
@@ -314,18 +317,18 @@ impl Rows<'_> {
             self.see_through(input, samples, pixels.clone(), sample_row, share);
             for ((_, at), plane) in layout.effects().zip(&mut self.effects) {
                 for c in 0..3 {
-                    let values = samples.value(input, begin, at + c);
+                    let values = samples.channel(input, begin, at + c);
                     add(plane[pixels.clone()].iter_mut().map(|sum| &mut sum[c]), values, share);
                 }
             }
             if let Some(at) = layout.normal() {
                 for c in 0..3 {
-                    let values = samples.value(input, begin, at + c);
+                    let values = samples.channel(input, begin, at + c);
                     add(self.normal[pixels.clone()].iter_mut().map(|sum| &mut sum[c]), values, share);
                 }
             }
             if let Some(at) = layout.shadow() {
-                add(self.shadow[pixels.clone()].iter_mut(), samples.value(input, begin, at), share);
+                add(self.shadow[pixels.clone()].iter_mut(), samples.channel(input, begin, at), share);
             }
         }
         for k in pixels {
@@ -337,11 +340,11 @@ impl Rows<'_> {
                 }
             }
             self.beauty[k] = sum;
-            self.tell(input, k, k - row * width, y);
+            self.depth_and_object(input, k, k - row * width, y);
         }
     }
 
-    /// Adds what is seen through a row of samples: alpha, the background, and what was mirrored and bent.
+    /// Adds alpha, background, reflection and refraction of one row of samples.
     fn see_through(
         &mut self,
         input: &FinishInput<'_>,
@@ -360,7 +363,7 @@ impl Rows<'_> {
             let pixel = pixels.start + i / input.antialias as usize;
             let through: [f32; 3] = std::array::from_fn(|c| samples.through[c][i]);
             let bent = input.glass.and_then(|glass| glass.bent(begin + i));
-            // What is hidden is not looked up.
+            // Looking up an environment is slow, so skip it where the background is hidden.
             if through != [0.0; 3] && bent.is_none() {
                 let behind = input.background.radiance(i as u32, sample_row as u32);
                 for c in 0..3 {
@@ -376,8 +379,8 @@ impl Rows<'_> {
         }
     }
 
-    /// Depths and object of pixel `k`, which is pixel (x, y) of the picture.
-    fn tell(&mut self, input: &FinishInput<'_>, k: usize, x: usize, y: usize) {
+    /// Writes depths and object of pixel `k` of this band, which is pixel (x, y) of the picture.
+    fn depth_and_object(&mut self, input: &FinishInput<'_>, k: usize, x: usize, y: usize) {
         let FinishInput { accumulator, opaque, antialias, .. } = input;
         let antialias = *antialias as usize;
         let sample_width = accumulator.size[0] as usize;

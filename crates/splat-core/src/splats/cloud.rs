@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Splats that a thread bounds at a time.
+/// Centres per task of [`Cloud::bounds`].
 const BOUNDED: usize = 1 << 14;
 
 /// What a splat is optically.

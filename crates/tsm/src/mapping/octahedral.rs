@@ -14,7 +14,7 @@ use super::{Crease, Mapping, Place, Ray, View};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-/// Directions that a thread finds at a time.
+/// Directions per task.
 const CHUNK: usize = 1 << 12;
 
 /// 2/π·atan(√s)/√s on [0, 1], a Chebyshev fit; the product with √s errs by less than 5e-8.

@@ -48,7 +48,7 @@ enum Kind {
 /// Cells are numbered with 31 bits, and their columns and rows are found exactly in single precision.
 const MOST_CELLS_OF_A_SIDE: u64 = 1 << 22;
 
-/// A mapping that is chosen and not made: its table of directions takes longer than all else that is predicted.
+/// Frame, kind and size of a mapping, without its table of directions, which takes longer than the rest of a prediction.
 struct Choice {
     frame: Frame,
     extent: Extent,
@@ -58,7 +58,7 @@ struct Choice {
     lit: Lit,
 }
 
-/// The cost of what [`plan`] would make.
+/// Predicts the cost of the map that [`plan`] would make.
 pub(crate) fn predict(
     casters: &Casters<'_>,
     survey: &Survey,
@@ -68,13 +68,13 @@ pub(crate) fn predict(
     choose(casters, survey, light, room).map(|choice| choice.prediction)
 }
 
-/// Chooses and makes a mapping of what is predicted to fit `room`.
+/// Chooses a mapping whose predicted cost fits `room`, and makes it.
 pub(crate) fn plan(casters: &Casters<'_>, survey: &Survey, light: &Light, room: &Limits) -> Result<Plan, Error> {
     let Choice { frame, extent, cell, prediction, lit } = choose(casters, survey, light, room)?;
     Ok(Plan { frame, table: extent.table(cell), prediction, lit })
 }
 
-/// Chooses frame, kind and size.
+/// Chooses frame, kind and size of a mapping whose predicted cost fits `room`.
 fn choose(casters: &Casters<'_>, survey: &Survey, light: &Light, room: &Limits) -> Result<Choice, Error> {
     let (kind, frame) = frame_of(casters, survey, light)?;
     let apparent = match kind {

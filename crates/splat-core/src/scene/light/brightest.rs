@@ -5,24 +5,25 @@ use crate::{Cloud, DAabb};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Splats that a thread looks at, at a time.
+/// Radii per task.
 const CHUNK: usize = 1 << 14;
 
 /// Standard deviation of a splat over its radius, at least.
 const LEAST_DEVIATION: f64 = 0.25;
 
-/// How near any splat of a cloud can be to a light.
+/// Bounds of a cloud that limit how near a splat can be to a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LitBounds {
-    /// Where centres lie, relative to the cloud's origin, so that a moved scene has the same bits; `None` of a cloud without splats.
+    /// Bounds of the centres, relative to `origin`, so that a moved scene has the same bits; `None` for an empty cloud.
     centers: Option<DAabb>,
+    /// Origin of the cloud, world units.
     origin: DVec3,
-    /// The least standard deviation.
+    /// The least standard deviation of a splat, world units.
     spread: f64,
 }
 
 impl LitBounds {
-    /// Those of the splats of a cloud.
+    /// Computes the bounds of a cloud in one parallel pass.
     pub fn new(cloud: &Cloud) -> Self {
         let bounds = cloud.bounds();
         let centers = (!bounds.is_empty()).then(|| DAabb::new(bounds.min.as_dvec3(), bounds.max.as_dvec3()));
@@ -31,8 +32,8 @@ impl LitBounds {
         Self { centers, origin: cloud.origin, spread: LEAST_DEVIATION * f64::from(least) }
     }
 
-    /// The most light of a lamp that any of the splats could receive without shadows, in the channel that has most, W/m²: at the place of the bounds of
-    /// their centres that is nearest to it, by the least radius. Infinite where a splat without extent could lie at the light.
+    /// Returns an upper bound of the irradiance that `light` gives any splat without shadows, W/m², in its brightest channel: at the point of the bounds that is
+    /// nearest to the light, with the least deviation. Infinite if a splat without extent could lie at the light. An empty cloud has the light's greatest intensity.
     pub fn brightest_of(&self, light: &Light) -> f64 {
         self.centers.map_or_else(
             || light.greatest_intensity(),
